@@ -335,6 +335,20 @@ def test_frames_of_a_longer_sequence_are_removed(skin1, scenes, tmp_path):
     assert numbers() == [0, 1, 2, 5, 6]
 
 
+def test_frames_in_the_other_format_stay_and_are_told_of(skin1, scenes, tmp_path, caplog):
+    frames = make_frames(skin1, scenes["edge"], length=2)
+    for form in ("exr", "png"):
+        files = FrameFiles(tmp_path, "variates", frames, form=form)
+        with caplog.at_level("INFO", logger="sssfit"), files.held():
+            for k in frames:
+                files.write("variates", k, np.full((4, 4, 3), 0.5))
+    assert caplog.messages == [
+        f"{tmp_path / 'frame-0000.exr'} and what follows it stay, of an earlier run; delete them "
+        "unless they are of the same sequence."
+    ]
+    assert len([*tmp_path.iterdir()]) == 4
+
+
 @pytest.mark.parametrize("name", ["", "-"])
 def test_frames_go_into_a_folder_with_a_name(skin1, name):
     with pytest.raises(ArgumentError, match=f"`frames` is '{name}'; expected the name of a folder"):

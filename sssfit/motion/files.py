@@ -57,6 +57,7 @@ class FrameFiles:
             )
         digits = max(len(str(len(frames.intensity) - 1)), 4)
         self._name_of = f"frame-{{:0{digits}}}.{form}".format
+        self._other = "exr" if form == "png" else "png"
         self.paths = [folder / self._name_of(k) for k in frames]
         self._name, self._channels = name, list(channels) if form == "exr" else None
         self._frames, self._force = frames, force
@@ -83,6 +84,16 @@ class FrameFiles:
                 for each in self.paths:
                     (self._aside / each.name).replace(each)
                 self._remove_longer()
+                self._tell_of_other()
+
+    def _tell_of_other(self) -> None:
+        """Say that an earlier sequence in the other format, which may be wanted, is still there."""
+        first = self.paths[0].with_suffix(f".{self._other}")
+        if is_image_file(first):
+            note(
+                f"{first} and what follows it stay, of an earlier run; delete them unless they are "
+                "of the same sequence."
+            )
 
     def _remove_longer(self) -> None:
         """Remove our frames that follow the last one, up to one that is missing or foreign."""
