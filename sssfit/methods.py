@@ -785,8 +785,8 @@ RENDERERS: Mapping[str, Method] = {
     "variates": Method("sssfit.motion.ways:variates", "adaptive, control variates"),
     "ahead": Method("sssfit.motion.ways:ahead", "adaptive, next frame's light"),
     "fixed": Method("sssfit.motion.ways:fixed", "fixed sampling"),
-    "separable": Method("sssfit.motion.ways:separable", "separable"),
-    "cascade": Method("sssfit.motion.ways:cascade", "cascade"),
+    "separable": Method("sssfit.motion.ways:separable", "separable kernel"),
+    "cascade": Method("sssfit.motion.ways:cascade", "cascade of taps"),
 }
 
 # What diffusion in texture space may leave out.
