@@ -106,6 +106,8 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
         origin = printable(origin or str(source))
         names = imported("sssfit.material:shipped_names")()
         path = Path(source)
+        if not str(source):
+            raise FileError(f"the name '' is empty; name {_expected()}.")
         if source in names and not path.exists():
             return imported("sssfit.material:load_material")(source)  # type: ignore[no-any-return]
         _check_regular_file(path, origin, names)

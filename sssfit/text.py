@@ -65,6 +65,8 @@ def read_text(
     SssfitError
         Of the type ``error``: missing, unreadable, a folder, no text, or larger than 500 MB.
     """
+    if isinstance(source, str | Path) and not origin:
+        raise error(f"the name '' is empty; name {expected}.")
     try:
         content = _bytes(source)
     except OSError as failure:

@@ -9,9 +9,11 @@ import sssfit
 from sssfit.errors import FileError, SssfitError
 from sssfit.export.summary import figures_of, summary
 from sssfit.fit import fit_taps
+from sssfit.formats.mci import load_mci
 from sssfit.kernel import SeparableKernel
 from sssfit.kinds import KINDS, load
 from sssfit.simulate import simulate_to_files
+from sssfit.sweep import load_plan
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +68,12 @@ def test_what_is_foreign_is_refused_by_its_name():
     for source in (3, None, b"art.toml"):
         with pytest.raises(FileError, match="is not a path; expected one, or a binary stream"):
             load(source)
+
+
+def test_an_empty_name_is_called_one():
+    for read in (load, load_mci, load_plan):
+        with pytest.raises(SssfitError, match="the name '' is empty; name an? "):
+            read("")
 
 
 def test_a_path_stays_on_its_line():
