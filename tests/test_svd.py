@@ -212,6 +212,12 @@ def test_the_error_falls_with_the_rank_to_nothing(profile, pitch):
     assert errors[-1] < 1e-12
 
 
+def test_a_single_eigenvalue_is_told_of_without_its_number():
+    profile = one_over_r_profile(40, 0.1, [0.3, 1.0])
+    only = fit_svd(profile, rank=1, support_mm=4.0, mm_per_pixel="profile")
+    assert only.stop_reasons[0] == "the largest of 41 eigenvalues"
+
+
 def test_noise_is_fitted_and_repeats_bit_for_bit():
     profile = noisy_profile(400, 5)
     first, second = (

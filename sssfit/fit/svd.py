@@ -166,7 +166,7 @@ def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> C
     return ChannelFit(
         signs,
         half,
-        f"the largest {rank} of {len(quadrant)} eigenvalues",
+        f"the largest {'' if rank == 1 else f'{rank} '}of {len(quadrant)} eigenvalues",
         parameters={"eigenvalues": values.tolist(), "scaled_by": factor},
         relative_frobenius_error=frobenius_error(target, quadrant, signs, half),
     )
