@@ -4,6 +4,7 @@ Files edited by hand and records made in Python get the same checks; each caller
 raise.
 """
 
+import dataclasses
 import inspect
 import math
 import re
@@ -110,6 +111,49 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+class ReadOnly:
+    """A frozen record whose arrays and mappings cannot be written to, nor can those of its copies.
+
+    numpy loses an array's flag in deep copies and pickles, and a mapping proxy has neither.
+    """
+
+    __slots__ = ()
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        values = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}  # type: ignore[arg-type]
+        fixed = tuple(name for name, value in values.items() if _is_fixed(value))
+        plain = {name: _open(value) for name, value in values.items()}
+        return _made_again, (type(self), plain, fixed)
+
+
+def _made_again(kind: type, values: dict[str, Any], fixed: tuple[str, ...]) -> object:
+    """Return a record with the fields of another, which were checked when that one was made."""
+    record: object = object.__new__(kind)
+    for name, value in values.items():
+        object.__setattr__(record, name, _closed(value) if name in fixed else value)
+    return record
+
+
+def _is_fixed(value: object) -> bool:
+    is_fixed_array = isinstance(value, np.ndarray) and not value.flags.writeable
+    return is_fixed_array or isinstance(value, MappingProxyType)
+
+
+def _open(value: Any) -> Any:
+    return dict(value) if isinstance(value, MappingProxyType) else value
+
+
+def _closed(value: Any) -> Any:
+    """Return an array, or a mapping with its arrays, that cannot be written to."""
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+        return value
+    for each in value.values():
+        if isinstance(each, np.ndarray):
+            each.flags.writeable = False
+    return MappingProxyType(value)
 
 
 def json_object(name: str, value: object, error: type[SssfitError]) -> Mapping[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, ReadOnly
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.covered import model_profiles
 from sssfit.errors import KernelError, RenderError
@@ -196,7 +196,7 @@ def _eight_bit(weights: FloatArray) -> FloatArray:
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Cause:
+class Cause(ReadOnly):
     """One reason why a picture differs from the truth.
 
     Parameters

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, ReadOnly, plain
 from sssfit.compare._budget_causes import (
     STORAGES,
     Cause,
@@ -43,7 +43,7 @@ _ROW_FIGURES = (*COLOUR_FIGURES, "relative_l2", "energy_drift")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Budget:
+class Budget(ReadOnly):
     """What a kernel loses on one picture, by cause.
 
     Parameters

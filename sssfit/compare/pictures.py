@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import BoolArray, FloatArray
+from sssfit.arrays import BoolArray, FloatArray, ReadOnly
 from sssfit.errors import RenderError
 from sssfit.fit._target import Target
 from sssfit.fit.artist import artist_pass
@@ -32,7 +32,7 @@ _JOINT, _SLOPE = (6.0 / 29.0) ** 3, (29.0 / 3.0) ** 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Panel:
+class Panel(ReadOnly):
     """A picture as a display shows it, and its distance from the true one.
 
     Parameters

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, ReadOnly
 from sssfit.errors import FileError, RenderError
 from sssfit.files import reason, temporary_folder, write_atomically
 from sssfit.formats._picture_files import (
@@ -364,7 +364,7 @@ __all__ = [
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Image:
+class Image(ReadOnly):
     """A picture of linear light. Arrays are stored as read-only float64.
 
     Parameters

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, ReadOnly, plain
 from sssfit.errors import KernelError
 from sssfit.files import write_atomically
 from sssfit.kernel import checks
@@ -34,7 +34,7 @@ PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profi
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class SeparableKernel:
+class SeparableKernel(ReadOnly):
     """A signed sum of separable terms per channel, on pixels.
 
     T terms, P = 2 h + 1 pixels, C channels, the channel axis last. Arrays are stored as read-only
@@ -137,12 +137,6 @@ class SeparableKernel:
         from sssfit.compare.kernel_view import view_kernel
 
         return kernel_figure(view_kernel(self, profile))
-
-    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
-        # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        plain = {"parameters": dict(self.parameters), "meta": dict(self.meta)}
-        return type(self), tuple((values | plain).values())
 
     @property
     def rank(self) -> int:

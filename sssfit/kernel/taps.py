@@ -26,6 +26,7 @@ import numpy as np
 
 from sssfit.arrays import (
     FloatArray,
+    ReadOnly,
     check_label,
     check_names,
     check_provenance,
@@ -88,7 +89,7 @@ def textures_for(channels: int) -> int:
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Stage:
+class Stage(ReadOnly):
     """One blur of a table of taps.
 
     Parameters
@@ -187,7 +188,7 @@ class Stage:
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Taps:
+class Taps(ReadOnly):
     """A kernel as a shader runs it: stages of few fetches and how their pictures are added up.
 
     L stages, C channels, the channel axis last. Arrays are stored as read-only float64.
@@ -280,12 +281,6 @@ class Taps:
         from sssfit.compare.taps_view import view_taps
 
         return taps_figure(view_taps(self, profile))
-
-    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
-        # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        plain = {"errors": dict(self.errors), "meta": dict(self.meta)}
-        return type(self), tuple((values | plain).values())
 
     @property
     def structure(self) -> str:

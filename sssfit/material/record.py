@@ -32,7 +32,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, check_names
+from sssfit.arrays import FloatArray, ReadOnly, check_names
 from sssfit.errors import MaterialError
 from sssfit.material.checks import (
     DENSE_PER_MM,
@@ -59,7 +59,7 @@ from sssfit.optics import normal_reflectance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layer:
+class Layer(ReadOnly):
     """One homogeneous layer of C channels.
 
     Parameters

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, ReadOnly, plain
 from sssfit.measure.delta_e import (
     auto_exposure,
     check_exposure,
@@ -37,7 +37,7 @@ SCORE_FIGURES = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ImageScore:
+class ImageScore(ReadOnly):
     """A picture compared with the true one, with C channels.
 
     Parameters

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, ReadOnly, plain
 from sssfit.errors import MaterialError, ProfileError
 from sssfit.files import write_atomically
 from sssfit.material import Material
@@ -39,7 +39,7 @@ _SHARES = (0.5, 0.9, 0.99)  # shares of the energy whose radii `Profile.to_dict`
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Profile:
+class Profile(ReadOnly):
     """Energy that leaves a material in annuli around the point where a pencil beam enters.
 
     A beam of weight 1 enters at normal incidence; all energies are fractions of it. n annuli, C
@@ -153,11 +153,6 @@ class Profile:
         from sssfit.chart.profile import profile_figure
 
         return profile_figure(self)
-
-    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
-        # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return type(self), tuple((values | {"meta": dict(self.meta)}).values())
 
     @property
     def n_annuli(self) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, ReadOnly
 from sssfit.errors import RenderError, SssfitWarning
 from sssfit.messages import counted
 
@@ -17,7 +17,7 @@ _FLAT = 1e-12  # of the longest edge's square: a triangle with less area has no 
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
+class Mesh(ReadOnly):
     """Triangles with texture coordinates; arrays are stored as read-only float64.
 
     x points right, y up and z to the viewer. Seen from outside, corners of a triangle go round

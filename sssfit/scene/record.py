@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, ReadOnly
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light, positive
 from sssfit.messages import counted, shown
@@ -22,7 +22,7 @@ _WITH_CHANNELS = ("irradiance", "specular", "back_irradiance")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class Scene(ReadOnly):
     """Irradiance on pixels, as linear light, with the other buffers of a renderer.
 
     Arrays are stored as read-only float64, channel axis last. H rows from the top, W columns.

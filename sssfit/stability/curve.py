@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, ReadOnly
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+class Curve(ReadOnly):
     """One method under one stress.
 
     Parameters
