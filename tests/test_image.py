@@ -460,7 +460,7 @@ def test_png_is_clipped_and_says_so(tmp_path):
         image.load_image(tmp_path / "a.png").pixels.ravel(), [0, 0.5, 1], atol=2e-5
     )
     values[0, 0] = 0.0
-    assert image.save_image(tmp_path / "a.png", values, exposure=0.5) == ()
+    assert image.save_image(tmp_path / "a.png", values, exposure=0.5, channels=["Y"]) == ()
 
 
 def test_signed_results_are_written_as_they_are(tmp_path):
@@ -479,6 +479,16 @@ def test_signed_results_are_written_as_they_are(tmp_path):
         (np.zeros((2, 2, 4)), {"format": "tiff"}, "4 channels do not fit a TIFF file"),
         (np.zeros((2, 2, 4)), {}, "0 channel names for 4 channels"),
         (np.zeros((2, 2, 2)), {"channels": "aa"}, "2 channel names for 2 channels"),
+        (
+            np.zeros((2, 2, 3)),
+            {"format": "png", "channels": "XYZ"},
+            "a PNG file has no names",
+        ),
+        (
+            np.zeros((2, 2, 1)),
+            {"format": "tiff", "channels": ["A"]},
+            "leave `channels` out",
+        ),
         (np.full((1, 1, 1), 1e39), {}, "1e[+]39 does not fit 32-bit floats"),
         (np.zeros((2, 2, 3)), {"exposure": 2.0}, "exposure = 2 is for PNG"),
         (np.zeros((2, 2, 3)), {"format": "png", "exposure": 0.0}, "exposure = 0; expected"),

@@ -130,14 +130,14 @@ class Evaluation:
                 raise RenderError(f"there is no {what} to write; give the kernel's profile.")
             is_light = what != "difference"
             is_map = not is_light and self.difference and self.difference.kind
+            form = image_format(target) if isinstance(target, Path) else "exr"
             settings: dict[str, Any] = {
-                "channels": ("R", "G", "B") if is_map else self.kernel.channels,
+                "channels": self.kernel.channels if form == "exr" and not is_map else None,
+                "format": form,
                 "mm_per_pixel": self.scene.mm_per_pixel,
                 **(alpha if is_light else {}),
             }
-            if not isinstance(target, Path):
-                settings["format"] = "exr"
-            elif image_format(target) == "png" and not is_map:  # false colours are no light
+            if form == "png" and not is_map:  # false colours are no light
                 settings["exposure"] = exposure or own
             for each in save_image(target, image, **settings):
                 note(f"{target}: {each}")

@@ -191,16 +191,19 @@ def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -
             f"{light.shape[1]} x {light.shape[0]} pixels do not fit a PNG file, which takes "
             f"{_LONGEST_PNG} a side; write an EXR."
         )
-    if format != "exr":
-        if count not in usual:
-            raise RenderError(
-                f"{count} channels do not fit a {format.upper()} file, which takes 1 or 3; "
-                "write an EXR."
-            )
-        return usual[count]
+    if format != "exr" and count not in usual:
+        raise RenderError(
+            f"{count} channels do not fit a {format.upper()} file, which takes 1 or 3; "
+            "write an EXR."
+        )
     if given is not None and not isinstance(given, Sequence):
         raise RenderError(f"channels = {shown(given)}; expected a list of names.")
     names = tuple(given) if given is not None else usual.get(count, ())
+    if format != "exr" and names != usual[count]:
+        raise RenderError(
+            f"channels = {shown(list(names))}; a {format.upper()} file has no names but "
+            f"{', '.join(usual[count])}: leave `channels` out, or write an EXR."
+        )
     for name in names:
         if not (
             isinstance(name, str) and name.isprintable() and len(name.encode()) <= _LONGEST_NAME

@@ -493,6 +493,7 @@ def save_image(
         Linear light; row 0 is the top.
     channels : sequence of str, optional
         Names for EXR; needed for other counts than 1 (Y) and 3 (R, G, B), which only EXR can hold.
+        TIFF and PNG hold no others than these.
         `load_image` interprets some: of X and Y it reads Y, and of a and b it takes a for alpha.
     format : str, optional
         "exr", "tiff" or "png"; by default from the ending.
