@@ -36,7 +36,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     kernel's pixel size; your own file (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with
     --screen and for a table of taps, which serves any size. The true picture is the same irradiance
     convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two in sRGB at the
-    exposure. The alpha channel of your file is copied unchanged.
+    exposure. The alpha channel of your file is copied, clipped to 0 to 1.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr

@@ -524,7 +524,23 @@ def test_a_mask_holds_whole_numbers(mask):
         Scene("x", picture(), 0.3, mask=mask)
 
 
-def test_alpha_a_little_below_0_is_none():
-    alpha = np.full((5, 7), -1e-3)
+@pytest.mark.parametrize(("stored", "kept"), [(-1e-3, 0.0), (1.02, 1.0)])
+def test_alpha_a_little_outside_0_to_1_is_clipped(stored, kept):
+    alpha = np.full((5, 7), stored)
     scene = Scene.from_image(image.Image(picture(), ("R", "G", "B"), alpha=alpha), 0.3)
-    assert scene.alpha.tolist() == np.zeros((5, 7)).tolist()
+    assert scene.alpha.tolist() == np.full((5, 7), kept).tolist()
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"channels": ("R", "G")}, r"^channels = \('R', 'G'\) for 3 channels; give each one name"),
+        ({"channels": None}, "^channels = None for 3 channels"),
+        ({"mm_per_pixel": "1"}, "^mm_per_pixel = '1'; expected a number above 0"),
+        ({"name": None}, "^name = None; expected a text"),
+        ({"alpha_is_multiplied": 1}, "^alpha_is_multiplied = 1; expected True or False"),
+    ],
+)
+def test_fields_of_a_picture_are_checked(fields, words):
+    with pytest.raises(RenderError, match=words):
+        image.Image(**{"pixels": picture(), "channels": "RGB"} | fields)

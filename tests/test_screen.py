@@ -324,7 +324,6 @@ def test_a_kernel_of_one_pixel_and_a_picture_of_one(rng):
     [
         ({"depth_mm": None}, {}, "needs depth_mm"),
         ({"distance_mm": None}, {}, "needs distance_mm"),
-        ({"distance_mm": 0.0}, {}, "distance_mm = 0"),
         ({"depth_mm": np.zeros((4, 5))}, {}, "depth_mm is 0 in 20 pixels"),
         ({"depth_mm": np.full((4, 5), 1e-300)}, {}, "would reach"),
         ({"specular": np.ones((4, 5, 2))}, {}, "specular of shape"),
@@ -356,6 +355,29 @@ def test_buffers_of_a_scene_have_their_number_of_axes(field):
     with pytest.raises(RenderError, match=rf"^bad: {field} of shape .*; expected rows") as error:
         Scene("bad", np.ones((4, 5, 3)), 0.5, **{field: np.ones(wrong)})
     assert str(wrong) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"name": None}, "^name = None; expected a text that prints on one line"),
+        ({"name": "a\nb"}, r"^name = 'a\\nb'; expected a text"),
+        (
+            {"mm_per_pixel": 10**400},
+            "^bad: mm_per_pixel = 1000.*; expected a number above 0",
+        ),
+        ({"distance_mm": 0.0}, "^bad: distance_mm = 0; expected a number above 0"),
+        ({"distance_mm": "1m"}, "^bad: distance_mm = '1m'; expected a number above 0"),
+        ({"alpha": np.full((4, 5), 5.0)}, "^bad: alpha reaches 5; expected coverage from 0 to 1"),
+        ({"alpha_is_multiplied": "no"}, "^bad: alpha_is_multiplied = 'no'; expected True or False"),
+        ({"channel_names": 3}, "^bad: channel_names = 3 for 3 channels; give each one name"),
+        ({"channel_names": ("R", "G", 3)}, "^bad: channel_names = .* for 3 channels; give each"),
+    ],
+)
+def test_fields_of_a_scene_are_checked(fields, words):
+    with pytest.raises(RenderError, match=words) as error:
+        Scene(**{"name": "bad", "irradiance": np.ones((4, 5, 3)), "mm_per_pixel": 0.5} | fields)
+    assert "\n" not in str(error.value)
 
 
 def test_the_documented_figures_are_up_to_date():

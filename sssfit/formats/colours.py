@@ -1,5 +1,6 @@
 """Colours of pictures: sRGB, primaries, and the values that each format can hold."""
 
+import contextlib
 import re
 from collections.abc import Sequence
 from numbers import Real
@@ -171,11 +172,31 @@ def as_light(values: npt.ArrayLike, what: str) -> FloatArray:
 
 def positive(value: object, what: str) -> float:
     """Return a finite number above 0."""
-    is_number = isinstance(value, Real) and not isinstance(value, bool)
-    if not is_number or not 0.0 < float(value) < np.inf:  # type: ignore[arg-type]
+    number = np.nan
+    if isinstance(value, Real) and not isinstance(value, bool):
+        with contextlib.suppress(OverflowError):  # an integer of 400 digits
+            number = float(value)
+    if not 0.0 < number < np.inf:
         said = f"{value:g}" if isinstance(value, float) else shown(value)
         raise RenderError(f"{what} = {said}; expected a number above 0.")
-    return float(value)  # type: ignore[arg-type]
+    return number
+
+
+def names_for(count: int, given: object, what: str) -> tuple[str, ...]:
+    """Return a name for each channel; raises for other counts, and for names that are no texts."""
+    names = tuple(given) if isinstance(given, list | tuple | str) else ()
+    if not all(isinstance(each, str) for each in names) or len({*names}) != count:
+        raise RenderError(
+            f"{what} = {shown(given)} for {counted(count, 'channel')}; give each one name."
+        )
+    return names
+
+
+def true_or_false(value: object, what: str) -> bool:
+    """Return a truth value; a text or a number is none."""
+    if not isinstance(value, bool | np.bool_):
+        raise RenderError(f"{what} = {shown(value)}; expected True or False.")
+    return bool(value)
 
 
 def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -> tuple[str, ...]:

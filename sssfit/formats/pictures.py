@@ -44,10 +44,12 @@ from sssfit.formats.colours import (
     check_alpha,
     check_values,
     matrix_to_bt709,
+    names_for,
     png_codes,
     positive,
     srgb_decode,
     srgb_encode,
+    true_or_false,
 )
 from sssfit.messages import printable, shown
 from sssfit.text import finite_number
@@ -98,7 +100,7 @@ def read_image(path: Path, layer: str | None, largest_bytes: float) -> dict[str,
             "mm_per_pixel": scale if scale > 0.0 else None,
             "alpha": alpha,
             "alpha_is_multiplied": is_multiplied,
-            "name": path.name,
+            "name": printable(path.name),
             "notes": (
                 *(*choice.notes, *_about_file(spec), *done),
                 *(*divided, *converted),
@@ -387,7 +389,7 @@ class Image(ReadOnly):
     Raises
     ------
     RenderError
-        An array does not hold real numbers, or has the wrong shape.
+        An array does not hold real numbers, or has the wrong shape; or another field is invalid.
     """
 
     pixels: FloatArray
@@ -407,6 +409,16 @@ class Image(ReadOnly):
                     f"alpha of shape {self.alpha.shape} for a picture of {self.pixels.shape[:2]}; "
                     "expected the same rows and columns."
                 )
+        if not isinstance(self.name, str):
+            raise RenderError(f"name = {shown(self.name)}; expected a text.")
+        kept = {
+            "channels": names_for(self.pixels.shape[2], self.channels, "channels"),
+            "alpha_is_multiplied": true_or_false(self.alpha_is_multiplied, "alpha_is_multiplied"),
+        }
+        if self.mm_per_pixel is not None:
+            kept["mm_per_pixel"] = positive(self.mm_per_pixel, "mm_per_pixel")
+        for field, value in kept.items():
+            object.__setattr__(self, field, value)
 
     def _store(self, field: str, dimensions: int) -> None:
         """Store an array read-only, in C order."""

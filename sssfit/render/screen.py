@@ -120,10 +120,6 @@ def depths(scene: Scene, mask: npt.NDArray[np.int32]) -> FloatArray:
             f"{scene.name}: rendering in screen space needs {missing}, and the scene has none; "
             "use the scene head or one that has depth_mm and distance_mm, or render it flat."
         )
-    if not (np.isfinite(scene.distance_mm) and scene.distance_mm > 0.0):
-        raise RenderError(
-            f"{scene.name}: distance_mm = {scene.distance_mm:g}; expected a length above 0."
-        )
     depth_mm: FloatArray = np.where(mask > 0, scene.depth_mm, 1.0)
     if (depth_mm <= 0.0).any():
         raise RenderError(

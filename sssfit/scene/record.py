@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly
+from sssfit.arrays import FloatArray, ReadOnly, check_label
 from sssfit.errors import RenderError
-from sssfit.formats.colours import as_light, positive
-from sssfit.messages import counted, shown
+from sssfit.formats.colours import as_light, names_for, positive, true_or_false
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
@@ -30,7 +30,7 @@ class Scene(ReadOnly):
     Parameters
     ----------
     name : str
-        Name for reports: that of a made picture or of a file.
+        Name for reports, on one line: that of a made picture or of a file.
     irradiance : array (H, W, C)
         Light that arrives at the surface, at least 0. C = 1 fits kernels with any number of
         channels.
@@ -49,7 +49,7 @@ class Scene(ReadOnly):
     back_irradiance : array (H, W, C) or (H, W, 1), optional
         Irradiance where that light enters.
     alpha : array (H, W), optional
-        Coverage of a picture from a file, kept for the output and never blurred.
+        Coverage of a picture from a file, 0 to 1, kept for the output and never blurred.
     alpha_is_multiplied : bool
         Whether the irradiance is multiplied by the coverage.
     channel_names : tuple of str, optional
@@ -59,7 +59,8 @@ class Scene(ReadOnly):
     Raises
     ------
     RenderError
-        A buffer has another shape than the irradiance, or holds NaN or negative values.
+        A buffer has another shape than the irradiance, or holds NaN or negative values; or another
+        field is invalid.
     """
 
     name: str
@@ -84,7 +85,8 @@ class Scene(ReadOnly):
         Parameters
         ----------
         image : Image
-            A picture from ``sssfit.formats.pictures.load_image``.
+            A picture from ``sssfit.formats.pictures.load_image``. Its alpha is clipped to 0 to 1,
+            beyond which the filters of renderers go a little.
         mm_per_pixel : float [mm]
         alpha_is_mask : bool
             The object is the part that alpha covers by half or more. There the light is divided by
@@ -95,28 +97,27 @@ class Scene(ReadOnly):
         RenderError
             The alpha channel should be the mask, but it is missing or covers nothing.
         """
-        # The filters of renderers leave alpha slightly below 0 in places.
-        alpha = None if image.alpha is None else np.maximum(image.alpha, 0.0)
+        name = image.name or "the picture"
+        coverage = image.alpha
+        alpha = None if coverage is None else np.clip(coverage, 0.0, 1.0)
         if not alpha_is_mask:
             return cls(
-                image.name,
+                name,
                 image.pixels,
                 mm_per_pixel,
                 alpha=alpha,
                 alpha_is_multiplied=image.alpha_is_multiplied,
                 channel_names=image.channels,
             )
-        if alpha is None:
-            raise RenderError(f"{image.name} has no alpha that could be the mask.")
-        inside = alpha >= _HALF
+        if coverage is None:
+            raise RenderError(f"{name} has no alpha that could be the mask.")
+        inside = coverage >= _HALF
         if not inside.any():
-            raise RenderError(
-                f"{image.name}: alpha is under {_HALF:g} everywhere; nothing is left."
-            )
-        share = np.where(inside, alpha, 1.0) if image.alpha_is_multiplied else 1.0
+            raise RenderError(f"{name}: alpha is under {_HALF:g} everywhere; nothing is left.")
+        share = np.where(inside, coverage, 1.0) if image.alpha_is_multiplied else 1.0
         light = np.where(inside[..., None], image.pixels / np.expand_dims(share, -1), 0.0)
         return cls(
-            image.name,
+            name,
             light,
             mm_per_pixel,
             mask=inside.astype(np.int32),
@@ -125,23 +126,32 @@ class Scene(ReadOnly):
         )
 
     def __post_init__(self) -> None:
+        check_label("name", self.name, RenderError)
         shape = as_light(self.irradiance, f"{self.name}: irradiance").shape
         if len(shape) != 3 or 0 in shape:
             raise RenderError(
                 f"{self.name}: irradiance of shape {shape}; expected rows, columns and channels, "
                 "at least one of each."
             )
-        names = self.channel_names
-        if names is not None and len({*names}) != shape[2]:
-            raise RenderError(
-                f"{self.name}: channel_names = {shown(names)} for {counted(shape[2], 'channel')}; "
-                "give each one name."
-            )
-        positive(self.mm_per_pixel, f"{self.name}: mm_per_pixel")
+        for field, value in self._checked_words(shape[2]).items():
+            object.__setattr__(self, field, value)
         for field in ("irradiance", "specular", "thickness_mm", "back_irradiance", "depth_mm"):
             self._store(field, np.float64)
         self._store("alpha", np.float64)
         self._store("mask", np.int32)
+
+    def _checked_words(self, channels: int) -> dict[str, Any]:
+        """Return the fields that are no buffers, as stored."""
+        multiplied = f"{self.name}: alpha_is_multiplied"
+        fields: dict[str, Any] = {
+            "mm_per_pixel": positive(self.mm_per_pixel, f"{self.name}: mm_per_pixel"),
+            "alpha_is_multiplied": true_or_false(self.alpha_is_multiplied, multiplied),
+        }
+        if self.distance_mm is not None:
+            fields["distance_mm"] = positive(self.distance_mm, f"{self.name}: distance_mm")
+        if (names := self.channel_names) is not None:
+            fields["channel_names"] = names_for(channels, names, f"{self.name}: channel_names")
+        return fields
 
     def _store(self, field: str, dtype: npt.DTypeLike) -> None:
         """Check the shape and values of a buffer and store it read-only."""
@@ -162,6 +172,10 @@ class Scene(ReadOnly):
         if field == "mask" and ((values % 1.0 != 0.0) | (values > _MAX_OBJECTS)).any():
             raise RenderError(
                 f"{self.name}: mask holds other values than whole numbers up to {_MAX_OBJECTS}."
+            )
+        if field == "alpha" and (values > 1.0).any():
+            raise RenderError(
+                f"{self.name}: alpha reaches {values.max():.3g}; expected coverage from 0 to 1."
             )
         # Always row-major: sums over pixels in another order round differently.
         kept = values.astype(dtype, order="C")
