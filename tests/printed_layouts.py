@@ -35,7 +35,14 @@ def plural(count: int, word: str) -> str:
 
 
 def materials_list(f: Figures) -> list[Any]:
-    heads = ["name", "eta", "albedo R G B", "mean free path R G B, mm", "dr, mm", "annuli"]
+    heads = [
+        "name",
+        "eta",
+        "scattering albedo R G B",
+        "transport MFP R G B, mm",
+        "dr, mm",
+        "annuli",
+    ]
     rows = [
         [
             row["name"],
@@ -85,11 +92,12 @@ def one_material(f: Figures) -> list[Any]:
         what = "semi-infinite" if thickness is None else Words("{} mm thick", thickness)
         which = f"layer {number}: " if len(f["layers"]) > 1 else ""
         keys = ("sigma_a_per_mm", "sigma_s_per_mm", "g", "albedo", "mean_free_path_mm")
-        heads = ["channel", "sigma_a, 1/mm", "sigma_s, 1/mm", "g", "albedo", "mean free path, mm"]
+        heads = ["channel", "sigma_a, 1/mm", "sigma_s, 1/mm", "g", "single-scattering albedo"]
+        heads += ["transport mean free path, mm"]
         rows = by_channel({**layer, "channels": f["channels"]}, keys)
         parts += [Words(which + "{}, eta {}", what, layer["eta"]), Table(heads, rows, alike=("g",))]
     if any(any(layer["g"]) for layer in f["layers"]):
-        parts.append(Words("mean free path: the reduced one, 1 / (sigma_a + (1 - g) sigma_s)"))
+        parts.append(Words("transport mean free path: 1 / (sigma_a + (1 - g) sigma_s)"))
     return parts + ([] if f["eta_below"] == 1 else [Words("below: eta {}", f["eta_below"])])
 
 
@@ -965,14 +973,16 @@ def _coefficients(f: Figures) -> list[Table]:
         for k, layer in enumerate(material["layers"])
         for c, name in enumerate(material["channels"])
     ]
-    heads = ["channel", "eta", "g", "sigma_a, 1/mm", "sigma_s, 1/mm", "albedo", "MFP, mm"]
+    heads = ["channel", "eta", "g", "sigma_a, 1/mm", "sigma_s, 1/mm", "single-scattering albedo"]
+    heads += ["transport MFP, mm"]
     one = () if len(material["layers"]) > 1 else ("eta", "g", "thickness, mm")
     return [Table([*heads, "thickness, mm"], rows, alike=one)]
 
 
 def _where_light_went(f: Figures) -> Table:
     heads = ["channel", "diffuse R", "+- stderr", "beyond grid", "of diffuse", "absorbed"]
-    heads += ["transmitted"] * (f["transmittance"] is not None) + ["unfinished", "sum - 1"]
+    heads += ["transmitted"] * (f["transmittance"] is not None)
+    heads += ["+- stderr"] * (f["transmittance_stderr"] is not None) + ["unfinished", "sum - 1"]
     rows = []
     for c, name in enumerate(f["channels"]):
         diffuse, beyond = f["diffuse_reflectance"][c], f["beyond_grid"][c]
@@ -986,6 +996,7 @@ def _where_light_went(f: Figures) -> Table:
                 Percent(beyond / diffuse) if diffuse > 0 else None,
                 None if f["absorbed"] is None else f["absorbed"][c],
                 *([] if f["transmittance"] is None else [f["transmittance"][c]]),
+                *([] if f["transmittance_stderr"] is None else [f["transmittance_stderr"][c]]),
                 Rough(f["unfinished"][c]),
                 None if f["absorbed"] is None else balance,
             ]

@@ -111,8 +111,8 @@ def test_show_prints_what_the_profile_holds(folder, profile):
             "g": "0",
             "sigma_a, 1/mm": f"{sigma_a:.5g}",
             "sigma_s, 1/mm": f"{sigma_s:.5g}",
-            "albedo": f"{sigma_s / (sigma_a + sigma_s):.5f}",
-            "MFP, mm": f"{1.0 / (sigma_a + sigma_s):.4f}",
+            "single-scattering albedo": f"{sigma_s / (sigma_a + sigma_s):.5f}",
+            "transport MFP, mm": f"{1.0 / (sigma_a + sigma_s):.4f}",
             "thickness, mm": "infinite",
         }
         beyond, absorbed = profile.beyond_grid[c], profile.absorbed[0, c]

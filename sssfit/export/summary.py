@@ -135,8 +135,8 @@ _LAYER = (
     ("sigma_a, 1/mm", "sigma_a_per_mm", ".6g"),
     ("sigma_s, 1/mm", "sigma_s_per_mm", ".6g"),
     ("g", "g", ".6g"),
-    ("albedo", "albedo", ".6g"),
-    ("mean free path, mm", "mean_free_path_mm", ".6g|inf"),
+    ("single-scattering albedo", "albedo", ".6g"),
+    ("transport mean free path, mm", "mean_free_path_mm", ".6g|inf"),
 )
 
 
@@ -156,7 +156,7 @@ def material_page(figures: Figures) -> str:
         parts = (heading + ", eta {eta:g}{clear}", Columns("channel", "channels", _LAYER))
         lines += ["", report(parts, own)]
     if any(any(layer["g"]) for layer in layers):
-        lines.append("mean free path: the reduced one, 1 / (sigma_a + (1 - g) sigma_s)")
+        lines.append("transport mean free path: 1 / (sigma_a + (1 - g) sigma_s)")
     if figures["eta_below"] != 1:
         lines += ["", filled("below: eta {eta_below:g}", figures)]
     return "\n".join(lines)
@@ -174,8 +174,8 @@ def shipped_page(figures: Figures) -> str:
         "name",
         values("name"),
         ("eta", values("eta"), "g"),
-        ("albedo R G B", values("albedo", ".5f"), ""),
-        ("mean free path R G B, mm", values("mean_free_path_mm", ".4f"), ""),
+        ("scattering albedo R G B", values("albedo", ".5f"), ""),
+        ("transport MFP R G B, mm", values("mean_free_path_mm", ".4f"), ""),
         ("dr, mm", values("dr_mm"), ".5f"),
         ("annuli", values("annuli"), ""),
         ("radius, mm", values("radius_mm"), ".2f"),
@@ -232,6 +232,7 @@ _ENERGIES = Columns(
         ("of diffuse", "beyond_share", ""),
         ("absorbed", "absorbed", ".6f"),
         ("transmitted", "transmittance", SHARE),
+        ("+- stderr", "transmittance_stderr", ".1e"),
         ("unfinished", "unfinished", ".1e"),
         ("sum - 1", "balance", ""),
     ),
@@ -244,7 +245,10 @@ _RADII = Columns(
         ("empty", "empty_annuli", ""),
     ),
 )
-_COEFFICIENTS = ("eta", "g", "sigma_a, 1/mm", "sigma_s, 1/mm", "albedo", "MFP, mm", "thickness, mm")
+_COEFFICIENTS = (
+    *("eta", "g", "sigma_a, 1/mm", "sigma_s, 1/mm", "single-scattering albedo"),
+    *("transport MFP, mm", "thickness, mm"),
+)
 _EMPTY = (
     "empty: annuli in which nothing was seen; their standard error of 0 says that, and not that "
     "R_d is 0 there."

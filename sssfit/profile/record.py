@@ -445,8 +445,8 @@ class Profile(ReadOnly):
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of ``sssfit show --json``, as lists and numbers, None if unknown.
 
-        ``material`` has the coefficients, albedo and mean free path of each layer; no layers if
-        only a name is known.
+        ``material`` has coefficients, albedo and transport mean free path of each layer; no
+        layers if only a name is known.
         """
         meta, width_mm = self.meta, np.diff(self.r_edges_mm)
         radii_mm = self.energy_radii_mm(_SHARES)
@@ -470,6 +470,7 @@ class Profile(ReadOnly):
                 "beyond_grid": self.beyond_grid,
                 "absorbed": self.absorbed.sum(axis=0) if len(self.absorbed) else None,
                 "transmittance": self.transmittance,
+                "transmittance_stderr": self.transmittance_stderr,
                 "unfinished": self.unfinished,
                 "energy_balance": self.energy_balance,
                 "energy_balance_stderr": meta.get("energy_balance_stderr"),
