@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,17 @@ def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArr
         raise error(f"{name} is not an array of numbers.")
     array.flags.writeable = False
     return array
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is one number that a float can hold; True and texts are not."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        float(value)
+    except OverflowError:  # an integer of 400 digits
+        return False
+    return True
 
 
 def is_whole(value: object) -> bool:
@@ -88,7 +99,8 @@ def _expected(setting: Setting, value: Any) -> str:
     if value is None or setting.kind == "text":
         return ""
     if setting.kind == "flag":
-        return "True or False" if isinstance(value, str) else ""
+        is_one = not isinstance(value, str | list | tuple | Mapping | np.ndarray)
+        return "" if is_one else "True or False"
     if setting.kind == "choice":
         is_one = isinstance(value, str) or callable(value)
         return "" if is_one else f"one of {', '.join(setting.among)}"
@@ -96,10 +108,9 @@ def _expected(setting: Setting, value: Any) -> str:
         return "a number, or one per channel" if isinstance(value, str | bool) else ""
     is_bool = isinstance(value, bool | np.bool_)
     if setting.kind in ("whole", "count"):
-        is_number = isinstance(value, float) or hasattr(value, "__index__")
-        return "" if is_number and not is_bool else "a whole number"
-    is_number = isinstance(value, int | float | np.integer | np.floating)
-    return "" if is_number and not is_bool else "a number"
+        is_plain = isinstance(value, float) or hasattr(value, "__index__")
+        return "" if is_plain and not is_bool else "a whole number"
+    return "" if is_number(value) else "a number"
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

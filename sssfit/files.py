@@ -8,6 +8,7 @@ import atexit
 import contextlib
 import errno
 import glob
+import io
 import os
 import shutil
 import stat
@@ -17,7 +18,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from sssfit.errors import ArgumentError, FileError
+from sssfit.errors import ArgumentError, FileError, SssfitError
+from sssfit.messages import shown
 
 if sys.platform == "win32":
     import msvcrt
@@ -42,6 +44,38 @@ _unfinished: set[Path] = set()
 def reason(error: OSError) -> str:
     """Say an operating-system error in lower case, without its number."""
     return (error.strerror or str(error)).lower()
+
+
+def path_of(path: object, error: type[SssfitError] = FileError) -> Path:
+    """Return the path that a caller gave, or raise an error for what cannot be one."""
+    if not isinstance(path, str | Path):
+        raise error(f"{shown(path)} is not a path; expected a text or a Path.")
+    if "\0" in str(path):
+        raise error(f"{shown(str(path))} holds a null character, which no file's name does.")
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        raise error(f"{shown(str(path))} holds half of a character; type it again.") from None
+    return Path(path)
+
+
+def source_of(
+    source: str | Path | BinaryIO, error: type[SssfitError] = FileError
+) -> Path | BinaryIO:
+    """Return an input's path or binary stream, or raise an error for what is neither."""
+    if isinstance(source, str | Path):
+        return path_of(source, error)
+    if not hasattr(source, "read") or isinstance(source, io.TextIOBase):
+        raise error(f"{shown(source)} is not a path; expected one, or a binary stream.")
+    return source
+
+
+def check_target(target: object) -> None:
+    """Raise an error for what is neither a path nor a binary stream that can be written to."""
+    if isinstance(target, str | Path):
+        path_of(target)
+    elif not hasattr(target, "write") or isinstance(target, io.TextIOBase):
+        raise FileError(f"{shown(target)} is not a path; expected one, or a binary stream.")
 
 
 def has_mark(path: Path, marks: Mapping[bytes, bytes]) -> bool:
@@ -214,16 +248,16 @@ def check_ending(path: Path, what: str, own: str) -> None:
         raise FileError(f"{path} ends in {ending}, and {what} is written; end its name in {own}.")
 
 
-def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
+def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
     """Write a complete file or nothing: temporary file in the same folder, fsync, rename.
 
     Raises
     ------
     FileError
         The disk is full, the folder read-only, or another failure; an older file at ``path`` stays
-        unchanged. Or it is a device or a pipe, which the new file would replace.
+        unchanged. Or it is a device or a pipe, which the new file would replace, or no path.
     """
-    path = followed(path)
+    path = followed(path_of(path))
     with _clear_errors(path):
         _check_ordinary(path)
         handle, temporary = _temporary(path)

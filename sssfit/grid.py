@@ -141,6 +141,7 @@ def _length(key: str, value: Any) -> float:
 def _check_count(annuli: int, dr_mm: float, whose: str = "", why: str = "") -> None:
     """Raise an error for too many rings, with a sufficient width or radius."""
     if annuli > MOST_ANNULI:
+        annuli = min(annuli, 10**300)  # a float has no larger ones
         least_dr = _rounded(dr_mm * (annuli / MOST_ANNULI), math.ceil)
         most_radius = _rounded(dr_mm * MOST_ANNULI, math.floor)
         raise SimulationError(

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 from sssfit.errors import FileError
-from sssfit.files import is_marked, read_at_most, reason
-from sssfit.messages import did_you_mean, printable, shown
+from sssfit.files import is_marked, read_at_most, reason, source_of
+from sssfit.messages import did_you_mean, printable
 from sssfit.methods import DEON_SKIN, imported
 from sssfit.text import decode
 
@@ -95,17 +95,15 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
     >>> load("skin1").name
     'skin1'
     """
-    if not isinstance(source, str | Path):
-        if not hasattr(source, "read"):
-            raise FileError(f"{shown(source)} is not a path; expected one, or a binary stream.")
-        origin = printable(origin or "the stream")
-        source = _whole(source, origin)
+    path = source_of(source)
+    if not isinstance(path, Path):
+        origin = printable(str(origin) if origin is not None else "the stream")
+        source = _whole(path, origin)
         kind = _kind(source)
         source.seek(0)
     else:
-        origin = printable(origin or str(source))
+        origin = printable(str(source if origin is None else origin))
         names = imported("sssfit.material:shipped_names")()
-        path = Path(source)
         if not str(source):
             raise FileError(f"the name '' is empty; name {_expected()}.")
         if source in names and not path.exists():
@@ -135,14 +133,15 @@ def _check_regular_file(path: Path, origin: str, names: Any) -> None:
     """Raise an error for missing files, folders, devices and pipes."""
     try:
         path.stat()
-    except (OSError, ValueError) as error:  # ValueError: a null character
-        why = reason(error) if isinstance(error, OSError) else str(error)
+    except OSError as error:
         if origin == DEON_SKIN:
             raise FileError(
                 f"{origin} has no coefficients and no file; simulate it, and name its profile."
             ) from None
         near = did_you_mean(origin, names).strip()
-        raise FileError(f"{origin} cannot be read: {why}.{f' {near}' if near else ''}") from None
+        raise FileError(
+            f"{origin} cannot be read: {reason(error)}.{f' {near}' if near else ''}"
+        ) from None
     if path.is_dir():
         raise FileError(f"{origin} is a folder; name a file in it.")
     if not path.is_file():

@@ -32,6 +32,7 @@ from types import FrameType, TracebackType
 from typing import Any, NoReturn
 
 from sssfit.errors import RenderError, SssfitError
+from sssfit.messages import shown
 
 if sys.platform != "win32":
     import resource
@@ -56,7 +57,7 @@ def thread_count(threads: int | None) -> int:
     except TypeError:
         count = 0
     if count < 1:
-        raise RenderError(f"threads = {threads!r}; expected a whole number from 1 up.")
+        raise RenderError(f"threads = {shown(threads)}; expected a whole number from 1 up.")
     return count
 
 
@@ -227,7 +228,7 @@ def check_threads_of_numba() -> None:
     given = os.environ.get("NUMBA_NUM_THREADS")
     if given is not None and not (given.strip().isdecimal() and int(given)):
         raise SssfitError(
-            f"NUMBA_NUM_THREADS = {given!r}; set it to a whole number from 1 up, or unset it."
+            f"NUMBA_NUM_THREADS = {shown(given)}; set it to a whole number from 1 up, or unset it."
         )
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from sssfit.errors import ArgumentError, SssfitError
-from sssfit.files import read_at_most, reason
+from sssfit.files import read_at_most, reason, source_of
 from sssfit.messages import printable
 
 # A million absorption boxes of an MCML run are 13 MB of text.
@@ -67,12 +67,11 @@ def read_text(
     """
     if isinstance(source, str | Path) and not origin:
         raise error(f"the name '' is empty; name {expected}.")
+    source = source_of(source, error)
     try:
         content = _bytes(source)
     except OSError as failure:
         raise error(f"{printable(origin)} cannot be read: {reason(failure)}.") from None
-    except ValueError as failure:  # a null character in the path
-        raise error(f"{printable(origin)} cannot be read: {failure}.") from None
     if len(content) > MOST_BYTES:
         raise error(
             f"{printable(origin)} is larger than {MOST_BYTES / 1e6:.0f} MB, not {expected}."
@@ -121,10 +120,10 @@ def _utf16(head: bytes) -> str | None:
     return None
 
 
-def _bytes(source: str | Path | BinaryIO) -> bytes:
+def _bytes(source: Path | BinaryIO) -> bytes:
     """All of it, or one byte more than is allowed."""
-    if isinstance(source, str | Path):
-        with Path(source).open("rb") as stream:
+    if isinstance(source, Path):
+        with source.open("rb") as stream:
             return read_at_most(stream, MOST_BYTES + 1)
     return read_at_most(source, MOST_BYTES + 1)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sssfit.errors import FileError
-from sssfit.files import has_mark
+from sssfit.files import check_target, has_mark
 
 FORMATS = ("png", "svg", "pdf")
 MAKER = "sssfit chart"
@@ -23,6 +23,7 @@ def chart_format(target: str | Path | BinaryIO) -> str:
     FileError
         The path has another ending, or a stream has none.
     """
+    check_target(target)
     if not isinstance(target, str | Path):
         raise FileError(f"a stream has no ending; name one of {', '.join(FORMATS)}.")
     return known_format(Path(target).suffix.removeprefix("."), str(target))

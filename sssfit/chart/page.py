@@ -41,7 +41,7 @@ from matplotlib.transforms import Bbox
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.files import MAKER, chart_format, known_format
-from sssfit.files import write_atomically
+from sssfit.files import check_target, write_atomically
 from sssfit.profile import full_kernel
 
 Style = dict[str, Any]
@@ -381,9 +381,10 @@ def save_figure(
     FileError
         The format is unknown, or the file cannot be written.
     """
+    check_target(target)
     chosen = chart_format(target) if format is None else known_format(format, f"format {format!r}")
     if isinstance(target, str | Path):
-        write_atomically(Path(target), lambda stream: _print(figure, stream, chosen))
+        write_atomically(target, lambda stream: _print(figure, stream, chosen))
     else:
         _print(figure, target, chosen)
 

@@ -47,6 +47,7 @@ from sssfit.fit import TapsFit, support_of
 from sssfit.fit.structures import width_pixels
 from sssfit.material import Material
 from sssfit.measure.score import COLOUR_FIGURES
+from sssfit.messages import shown
 from sssfit.profile import Profile
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
@@ -326,7 +327,7 @@ def _check(mm_per_pixel: float, tolerance: float | None, tolerance_of: str) -> N
     """Refuse values out of their range, before anything is simulated."""
     if tolerance_of not in TOLERANCES:
         raise RenderError(
-            f"tolerance_of = {tolerance_of!r}; expected one of {', '.join(TOLERANCES)}."
+            f"tolerance_of = {shown(tolerance_of)}; expected one of {', '.join(TOLERANCES)}."
         )
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise RenderError(f"tolerance = {tolerance:g}; expected a Delta E above 0.")

@@ -16,7 +16,7 @@ from sssfit.grid import RadialGrid, make_grid
 from sssfit.kernel import Kernel, SeparableKernel, Stage, Taps
 from sssfit.material import Material
 from sssfit.measure.score import ImageScore, measure
-from sssfit.messages import note
+from sssfit.messages import note, shown
 from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.render.full_resolution import render_full_resolution
@@ -160,7 +160,7 @@ def stored(kernel: Kernel, storage: str) -> Kernel:
         No such storage.
     """
     if storage not in STORAGES:
-        raise KernelError(f"storage = {storage!r}; expected one of {', '.join(STORAGES)}.")
+        raise KernelError(f"storage = {shown(storage)}; expected one of {', '.join(STORAGES)}.")
     if isinstance(kernel, SeparableKernel):
         return dataclasses.replace(kernel, weights=_rounded(kernel.weights, storage))
     stages = tuple(_stored_stage(each, storage) for each in kernel.stages)

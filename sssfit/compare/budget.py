@@ -32,6 +32,7 @@ from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.material import Material
 from sssfit.measure.delta_e import selected_pixels, selection
 from sssfit.measure.score import COLOUR_FIGURES, ImageScore
+from sssfit.messages import shown
 from sssfit.scene.record import Scene
 from sssfit.simulate import Progress
 
@@ -269,7 +270,7 @@ def _check(material: Material, scenes: Sequence[Scene], model: str | None) -> No
     own = models_of(material)
     if model is not None and model not in own:
         raise SimulationError(
-            f"model = {model!r}; of {material.name} there is {', '.join(own)}, or none."
+            f"model = {shown(model)}; of {material.name} there is {', '.join(own)}, or none."
         )
     if not scenes:
         raise RenderError("no picture: an error budget is of at least one.")

@@ -14,7 +14,7 @@ from sssfit.errors import ProfileError
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material
 from sssfit.material.checks import is_name
-from sssfit.messages import note
+from sssfit.messages import note, shown
 from sssfit.methods import VIEWS, imported
 from sssfit.profile import Profile
 
@@ -62,7 +62,7 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
 def _kind_of(found: Any, view: str, name: str) -> str:
     """Return the name of the view, by default of a record's own chart; refuse what has none."""
     if view and view not in VIEWS:
-        raise ProfileError(f"no view {view!r} of a file; expected one of {', '.join(VIEWS)}.")
+        raise ProfileError(f"no view {shown(view)} of a file; expected one of {', '.join(VIEWS)}.")
     record = type(found).__name__
     views = [view] if view else [key for key, each in VIEWS.items() if not each.flag]
     for key in views:

@@ -67,7 +67,9 @@ def exported(
         setting is invalid or not of this form.
     """
     if form not in EXPORTS:
-        raise KernelError(f"no format {form!r} of a kernel; expected one of {', '.join(EXPORTS)}.")
+        raise KernelError(
+            f"no format {shown(form)} of a kernel; expected one of {', '.join(EXPORTS)}."
+        )
     _check_sources(sources, form)
     settings = _own_settings(form, settings)
     entry = EXPORTS[form]

@@ -15,6 +15,7 @@ from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import Target
 from sssfit.kernel import SeparableKernel, Taps
+from sssfit.messages import shown
 from sssfit.process import one_blas_thread
 
 ENERGIES = ("rescale", "keep")
@@ -23,7 +24,7 @@ ENERGIES = ("rescale", "keep")
 def rescales_energy(energy: str) -> bool:
     """Return True for "rescale" and False for "keep"; any other word raises FitError."""
     if energy not in ENERGIES:
-        raise FitError(f"energy = {energy!r}; expected {' or '.join(map(repr, ENERGIES))}.")
+        raise FitError(f"energy = {shown(energy)}; expected {' or '.join(map(repr, ENERGIES))}.")
     return energy == "rescale"
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.fit._target import Target
-from sssfit.messages import counted, printable
+from sssfit.messages import counted, printable, shown
 from sssfit.scene.load import load_scene
 from sssfit.scene.made import MADE, check_pictures
 from sssfit.scene.record import Scene
@@ -257,7 +257,7 @@ def _power(
 ) -> FloatArray:
     """Return the weights (C, n, n) of squared errors, of which sum power wanted^2 = 1."""
     if not isinstance(pictures, Scene) and pictures not in SPECTRA:
-        raise FitError(f"spectrum = {pictures!r}; expected {' or '.join(map(repr, SPECTRA))}.")
+        raise FitError(f"spectrum = {shown(pictures)}; expected {' or '.join(map(repr, SPECTRA))}.")
     power = cell[:, None] * cell
     if pictures != "white":
         sine = 4.0 * np.sin(0.5 * w) ** 2

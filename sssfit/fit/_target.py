@@ -104,7 +104,7 @@ def make_target(
     pitch = pitch_of(profile, mm_per_pixel)
     if not isinstance(support_mm, Real | None):
         raise FitError(f"support_mm = {shown(support_mm)}; expected a length in mm.")
-    support = support_of(profile) if support_mm is None else float(support_mm)
+    support = support_of(profile) if support_mm is None else _as_float(support_mm)
     for name, value in (("mm_per_pixel", pitch), ("support", support)):
         if not _MIN_MM <= value <= _MAX_MM:
             raise FitError(
@@ -152,7 +152,15 @@ def pitch_of(profile: Profile, mm_per_pixel: Pitch | None = None) -> float:
             f"mm_per_pixel = {shown(mm_per_pixel)}; expected a length in mm, or 'profile' for "
             "the width of the profile's first annulus."
         )
-    return float(mm_per_pixel)
+    return _as_float(mm_per_pixel)
+
+
+def _as_float(length_mm: Real) -> float:
+    """Return a length as a float; what a float cannot hold is infinite, and is refused as that."""
+    try:
+        return float(length_mm)
+    except OverflowError:
+        return math.inf
 
 
 def support_of(profile: Profile) -> float:

@@ -19,6 +19,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, KernelError
 from sssfit.fit._chain import Chain
 from sssfit.kernel.structure import Shape, parse
+from sssfit.messages import shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +78,7 @@ def equal_pairs(stages: str) -> tuple[Shape, ...]:
         raise FitError(str(error)) from None
     if len({(each.kind, each.pairs) for each in shapes}) > 1 or shapes[0].kind != "pair":
         raise FitError(
-            f"stages = {stages!r}; expected the same number of tap pairs in each, such as "
+            f"stages = {shown(stages)}; expected the same number of tap pairs in each, such as "
             "1|1|1 or 3-3-3: all stages are one blur."
         )
     return shapes

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy import optimize
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_whole
 from sssfit.errors import FitError, KernelError
 from sssfit.fit._chain import Chain, Numbers, Searched
 from sssfit.fit._chain_pairs import PairChain
@@ -121,6 +121,7 @@ def fit_cascade(
         There is no such picture, or it cannot be read.
     """
     begun = time.perf_counter()
+    check_seed(seed)
     width = width_pixels(profile, pitch_of(profile, mm_per_pixel))
     shapes = structure_for(fetches, stages, passes, width, full_resolution=full_resolution)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
@@ -168,6 +169,12 @@ def _near(like: object, shapes: Sequence[Shape], target: Target, lit: list[int])
     if like.structure != text_of(shapes):
         return None
     return numbers_of(like, lit, target.mm_per_pixel)
+
+
+def check_seed(seed: object) -> None:
+    """Raise FitError for what is no seed of random starts."""
+    if not is_whole(seed) or seed < 0:  # type: ignore[operator]
+        raise FitError(f"seed = {shown(seed)}; expected a whole number from 0 up.")
 
 
 def whole_target(
@@ -304,6 +311,7 @@ def searched(
     effort : int
         Multiplies the number of random starts.
     """
+    check_seed(seed)
     rng = np.random.default_rng([seed])
     rough = [_rough(few, few.start(rng)) for _ in range(effort * _STARTS)]
     kept = [each.x for each in sorted(rough, key=lambda each: each.fun)[: effort * _KEPT_STARTS]]

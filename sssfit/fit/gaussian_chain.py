@@ -33,6 +33,7 @@ from sssfit.fit._target import Pitch, Target
 from sssfit.fit._tied_chain import equal_pairs, gaussian_weights, one_shape
 from sssfit.fit.cascade import ALIASING, searched, table_of, whole_target
 from sssfit.kernel.structure import Shape
+from sssfit.messages import shown
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 
@@ -102,12 +103,12 @@ def fit_gaussian_chain(
 def _checked(stages: str, blur: str) -> tuple[Shape, ...]:
     """Return the stages, or raise FitError."""
     if blur not in BLURS:
-        raise FitError(f"blur = {blur!r}; expected {' or '.join(map(repr, BLURS))}.")
+        raise FitError(f"blur = {shown(blur)}; expected {' or '.join(map(repr, BLURS))}.")
     shapes = equal_pairs(stages)
     if blur == "published" and shapes[-1].level > 0:
         raise FitError(
-            f"stages = {stages!r}: the published chain has no halved pictures; leave out the |, or "
-            "let the widths be fitted."
+            f"stages = {shown(stages)}: the published chain has no halved pictures; leave out "
+            "the |, or let the widths be fitted."
         )
     return shapes
 

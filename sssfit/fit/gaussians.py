@@ -28,7 +28,7 @@ from sssfit.fit._gaussians_objective import make_annuli
 from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, is_steep, search
 from sssfit.fit._result import ChannelFit, FitResult, energy_factor, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, Target, make_target
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
@@ -149,7 +149,7 @@ def _checked_terms(terms: int) -> int:
     except TypeError:
         number = 0
     if not 1 <= number <= MOST_TERMS:
-        raise FitError(f"terms = {terms!r}; expected a whole number from 1 to {MOST_TERMS}.")
+        raise FitError(f"terms = {shown(terms)}; expected a whole number from 1 to {MOST_TERMS}.")
     return number
 
 

@@ -29,7 +29,7 @@ from sssfit.fit._spectrum import SpectralTarget, pictures_of, spectral_target
 from sssfit.fit._target import make_target
 from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.kernel.structure import MOST_PAIRS
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
@@ -115,15 +115,15 @@ def on_taps(
 def _checked(taps: object, kernel: SeparableKernel, place: str) -> int:
     """Return the number of taps, or raise FitError."""
     if place not in PLACES:
-        raise FitError(f"place = {place!r}; expected {' or '.join(map(repr, PLACES))}.")
+        raise FitError(f"place = {shown(place)}; expected {' or '.join(map(repr, PLACES))}.")
     try:
         count = operator.index(taps)  # type: ignore[arg-type]
     except TypeError:
         count = 0
     if not (LEAST_TAPS <= count <= MOST_TAPS and count % 2):
         raise FitError(
-            f"taps = {taps!r}; expected an odd number from {LEAST_TAPS} to {MOST_TAPS}: the middle "
-            "and mirrored pairs."
+            f"taps = {shown(taps)}; expected an odd number from {LEAST_TAPS} to {MOST_TAPS}: the "
+            "middle and mirrored pairs."
         )
     if count > kernel.pixels:
         raise FitError(

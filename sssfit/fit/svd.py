@@ -30,6 +30,7 @@ from sssfit.fit._result import (
     rescales_energy,
 )
 from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.messages import shown
 from sssfit.profile import Profile
 
 _USUAL_RANK = 3
@@ -180,7 +181,7 @@ def _checked_rank(rank: int | None, target: Target) -> int:
     try:
         whole = operator.index(rank)
     except TypeError:
-        raise FitError(f"rank = {rank!r}; expected a whole number from 1 to {most}.") from None
+        raise FitError(f"rank = {shown(rank)}; expected a whole number from 1 to {most}.") from None
     if not 1 <= whole <= most:
         raise FitError(
             f"rank = {whole}; expected 1 to {most}: the kernel has {pixels} x {pixels} pixels and, "

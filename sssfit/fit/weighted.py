@@ -37,6 +37,7 @@ from sssfit.fit._spectrum import (
 )
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.fit.svd import eigenpairs
+from sssfit.messages import shown
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
 
@@ -107,7 +108,7 @@ def _checked_rank(rank: object, target: Target) -> int:
     except TypeError:
         terms = 0
     if not 1 <= terms <= _MOST_RANK:
-        raise FitError(f"rank = {rank!r}; expected a whole number from 1 to {_MOST_RANK}.")
+        raise FitError(f"rank = {shown(rank)}; expected a whole number from 1 to {_MOST_RANK}.")
     return min(terms, target.half_pixels + 1)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from sssfit.errors import FileError, RenderError
-from sssfit.files import has_mark, reason
+from sssfit.files import check_target, has_mark, path_of, reason
 from sssfit.messages import counted, printable, shown
 
 if TYPE_CHECKING:
@@ -168,6 +168,7 @@ def image_format(target: str | Path | BinaryIO) -> str:
     FileError
         The path has another ending, or a stream has none.
     """
+    check_target(target)
     if not isinstance(target, str | Path):
         raise FileError(f"a stream has no ending; name a format: {', '.join(FORMATS)}.")
     if (chosen := _ENDINGS.get(Path(target).suffix.lower())) is None:
@@ -182,9 +183,7 @@ def as_path(path: object) -> Path:
     """Return the path of a picture; raises an error if it cannot be one."""
     if not isinstance(path, str | os.PathLike) or isinstance(os.fspath(path), bytes):
         raise FileError(f"{shown(path)} is not a path; name an {READ} file.")
-    if "\0" in (text := os.fspath(path)):
-        raise FileError(f"{shown(text)} holds a null character, which no file's name does.")
-    return Path(text)
+    return path_of(os.fspath(path))
 
 
 def is_image_file(path: str | Path) -> bool:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray, ReadOnly
 from sssfit.errors import FileError, RenderError
-from sssfit.files import reason, temporary_folder, write_atomically
+from sssfit.files import check_target, reason, temporary_folder, write_atomically
 from sssfit.formats._picture_files import (
     FORMATS,
     FULL_SCALE,
@@ -531,10 +531,13 @@ def save_image(
     RenderError
         The values are not finite, or do not fit the format.
     """
-    chosen = format or image_format(target)
-    if chosen not in FORMATS:
+    check_target(target)
+    is_default = format is None or (isinstance(format, str) and not format)
+    chosen = image_format(target) if is_default else format
+    if not isinstance(chosen, str) or chosen not in FORMATS:
         raise FileError(f"format {shown(chosen)}: pictures are written as {', '.join(FORMATS)}.")
     light = as_light(pixels, "the picture")
+    alpha_is_multiplied = true_or_false(alpha_is_multiplied, "alpha_is_multiplied")
     exposure = positive(exposure, "exposure")
     pitch = None if mm_per_pixel is None else positive(mm_per_pixel, "mm_per_pixel")
     names = channel_names(light, channels, chosen)

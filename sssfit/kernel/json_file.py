@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from sssfit.errors import KernelError
-from sssfit.files import has_mark, read_at_most, reason
+from sssfit.files import has_mark, read_at_most, reason, source_of
 from sssfit.messages import counted, did_you_mean, shown
 
 Schema = Mapping[str, Any]
@@ -162,9 +162,10 @@ def _is_finite(value: float) -> bool:
 
 def read_bytes(source: str | Path | BinaryIO, origin: str, form: JsonFormat) -> bytes:
     """Read the whole file, up to a limit."""
+    source = source_of(source, KernelError)
     try:
-        if isinstance(source, str | Path):
-            with Path(source).open("rb") as file:
+        if isinstance(source, Path):
+            with source.open("rb") as file:
                 text = read_at_most(file, MOST_BYTES + 1)
         else:
             text = read_at_most(source, MOST_BYTES + 1)

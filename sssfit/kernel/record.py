@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, ReadOnly, plain
+from sssfit.arrays import FloatArray, ReadOnly, is_whole, plain
 from sssfit.errors import KernelError
 from sssfit.files import write_atomically
 from sssfit.kernel import checks
 from sssfit.kernel import json as kernel_json
 from sssfit.kernel.json import FORMAT, is_kernel_file
-from sssfit.messages import by_channel, counted, html_table, number, of_material, printable
+from sssfit.messages import by_channel, counted, html_table, number, of_material, printable, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -173,15 +173,22 @@ class SeparableKernel(ReadOnly):
 
     def quadrant(self, channel: int) -> FloatArray:
         """Return one quadrant of the 2D kernel with both its axes, (h+1, h+1)."""
+        self._check_channel(channel)
         half = self.weights[:, self.half_pixels :, channel]
         quadrant: FloatArray = (half * self.signs[:, channel, None]).T @ half
         return quadrant
 
     def full(self, channel: int) -> FloatArray:
         """Return the 2D kernel of a channel, (P, P)."""
+        self._check_channel(channel)
         passes = self.weights[:, :, channel]
         kernel: FloatArray = (passes * self.signs[:, channel, None]).T @ passes
         return kernel
+
+    def _check_channel(self, channel: int) -> None:
+        count = len(self.channels)
+        if not is_whole(channel) or not -count <= channel < count:
+            raise KernelError(f"channel = {shown(channel)}; expected 0 to {count - 1}.")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the contents of the kernel's file."""
@@ -228,7 +235,7 @@ class SeparableKernel(ReadOnly):
         FileError
             The file cannot be written; an older file at ``path`` stays unchanged.
         """
-        write_atomically(Path(path), self.write)
+        write_atomically(path, self.write)
 
     @classmethod
     def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
@@ -242,7 +249,7 @@ class SeparableKernel(ReadOnly):
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the kernel"
-        origin = printable(origin)
+        origin = printable(str(origin))
         fields = kernel_json.unpack(source, origin)
         try:
             return cls(**fields)

@@ -328,7 +328,7 @@ class Taps(ReadOnly):
         KernelError
             The format is another.
         """
-        if texel not in BYTES:
+        if not isinstance(texel, str) or texel not in BYTES:
             raise KernelError(f"texel = {shown(texel)}; expected {', '.join(BYTES)}.")
         return BYTES[texel] * self.cost.pictures * textures_for(len(self.channels))
 
@@ -430,7 +430,7 @@ class Taps(ReadOnly):
         FileError
             The file cannot be written; an older file at ``path`` stays unchanged.
         """
-        write_atomically(Path(path), self.write)
+        write_atomically(path, self.write)
 
     @classmethod
     def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
@@ -444,7 +444,7 @@ class Taps(ReadOnly):
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the table of taps"
-        origin = printable(origin)
+        origin = printable(str(origin))
         fields, said = taps_json.unpack(source, origin)
         try:
             fields["stages"] = tuple(Stage(**each) for each in fields["stages"])

@@ -136,7 +136,7 @@ class Layer(ReadOnly):
 
     @property
     def mean_free_path_mm(self) -> FloatArray:
-        """Reduced mean free path 1 / (sigma_a + (1 - g) sigma_s) [mm], (C,); inf if clear."""
+        """Transport mean free path 1 / (sigma_a + (1 - g) sigma_s) [mm], (C,); inf if clear."""
         sigma_t = self.reduced_sigma_t_per_mm
         return np.divide(1.0, sigma_t, out=np.full_like(sigma_t, math.inf), where=sigma_t > 0)
 
@@ -269,7 +269,7 @@ class Material:
         try:
             layers = tuple(_layer_from_dict(layer) for layer in content["layers"])
             return cls(**{**content, "layers": layers})
-        except (KeyError, TypeError) as error:
+        except (KeyError, IndexError, TypeError) as error:
             raise MaterialError(
                 f"a material's record is damaged ({printable(str(error))}); make a new one."
             ) from None
@@ -347,17 +347,23 @@ _PAPER = (
 )
 
 
-@cache
 def material_names(*, paper: bool = False, layered: bool = False) -> tuple[str, ...]:
     """Return the names of the half spaces that ship with sssfit, sorted.
 
     ``paper`` selects those in the supplement of "Separable Subsurface Scattering", ``layered`` the
     materials of several layers and the slabs in their place.
     """
+    for word, value in (("paper", paper), ("layered", layered)):
+        if not isinstance(value, bool | np.bool_):
+            raise MaterialError(f"{word} = {shown(value)}; expected True or False.")
     if paper:
         return _PAPER
-    folder = resources.files("sssfit.materials")
-    files = (folder / "layered" if layered else folder).iterdir()
+    return _names_in("layered" if layered else ".")
+
+
+@cache
+def _names_in(folder: str) -> tuple[str, ...]:
+    files = (resources.files("sssfit.materials") / folder).iterdir()
     return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
 
 

@@ -6,9 +6,10 @@ from types import ModuleType
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import BoolArray, FloatArray
+from sssfit.arrays import BoolArray, FloatArray, is_number
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light
+from sssfit.messages import shown as in_words
 
 # Blocks that fit in the cache: 1080p takes 0.7 s, but 2 s in blocks of 65536 and 4 s whole.
 BLOCK_PIXELS = 16384
@@ -112,7 +113,8 @@ def selection(mask: npt.ArrayLike | None, picture: FloatArray) -> BoolArray:
     """Return which pixels (H, W) count: those where the mask is above 0, or all without a mask."""
     if mask is None:
         return np.ones(picture.shape[:2], dtype=np.bool_)
-    selected = np.asarray(mask) > 0
+    given = as_light(mask, "mask")
+    selected = given > 0
     if selected.shape != picture.shape[:2]:
         raise RenderError(
             f"mask is {selected.shape} and the picture {picture.shape[:2]}; expected the same rows "
@@ -162,8 +164,9 @@ def exposure_of(pixels: FloatArray) -> float:
 
 def check_exposure(exposure: float) -> float:
     """Return a given exposure, or raise an error."""
-    if not (np.isfinite(exposure) and exposure > 0.0):
-        raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
+    if not is_number(exposure) or not 0.0 < exposure <= np.finfo(np.float64).max:
+        said = f"{exposure:g}" if isinstance(exposure, float) else in_words(exposure)
+        raise RenderError(f"exposure = {said}; expected a factor above 0.")
     return float(exposure)
 
 

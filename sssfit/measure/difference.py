@@ -15,6 +15,7 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.formats.colours import linear_from_hex, srgb_decode, srgb_encode
+from sssfit.messages import shown
 
 MAPS = ("signed", "absolute")
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear R, G, B: ITU-R BT.709-6
@@ -92,7 +93,7 @@ def difference_map(
         magnified = magnified_difference(picture, truth, gain=gain)
         return DifferenceMap(magnified, None, None, None, gain)
     if kind not in MAPS:
-        raise RenderError(f"kind = {kind!r}; expected {' or '.join(MAPS)}.")
+        raise RenderError(f"kind = {shown(kind)}; expected {' or '.join(MAPS)}.")
     values, what = _values(_difference(picture, truth), kind)
     end = float(np.abs(values).max(initial=0.0)) / _gain(gain)
     at = values / end if end > 0.0 else values  # no difference: the colour of 0

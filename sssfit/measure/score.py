@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray, ReadOnly, plain
+from sssfit.formats.colours import true_or_false
 from sssfit.measure.delta_e import (
     auto_exposure,
     check_exposure,
@@ -126,6 +127,7 @@ def measure(
     >>> score.maximum, score.energy_drift.tolist(), round(score.psnr_db, 2)
     (0.25, [-0.25], 9.03)
     """
+    structure = true_or_false(structure, "structure")
     pictures = check_pair(image, truth)
     selected = selection(mask, pictures[1])
     pixels, true = (selected_pixels(picture, selected) for picture in pictures)

@@ -173,6 +173,8 @@ def check_directions(fields: Mapping[str, Any]) -> None:
         raise ProfileError(f"{given[0]} is given without exit_angle_edges_rad.")
     if edges is None:
         return
+    if edges.ndim != 1 or len(edges) < 2:
+        raise ProfileError(f"exit_angle_edges_rad has shape {edges.shape}; expected (angles + 1,).")
     if edges[0] != 0.0 or (np.diff(edges) <= 0.0).any() or abs(edges[-1] - 0.5 * np.pi) > 1e-12:
         raise ProfileError("exit_angle_edges_rad; expected angles that rise from 0 to pi/2.")
     for name, whole in _PAIRS:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
-from sssfit.files import is_marked, read_at_most, reason
+from sssfit.files import is_marked, read_at_most, reason, source_of
 from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
@@ -89,10 +89,11 @@ def unpack(
     ProfileError
         The file is missing, unreadable, damaged, foreign, too large, or of another format version.
     """
+    source = source_of(source, ProfileError)
     try:
-        if isinstance(source, str | Path):
-            _check_regular_file(Path(source))
-            with Path(source).open("rb") as stream:
+        if isinstance(source, Path):
+            _check_regular_file(source)
+            with source.open("rb") as stream:
                 return _unpack_known(stream)
         # A pipe cannot seek, but an archive's directory is at its end.
         return _unpack_known(io.BytesIO(read_at_most(source, _LARGEST_FILE_BYTES)))

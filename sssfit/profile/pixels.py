@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, number_array
 from sssfit.errors import ProfileError
+from sssfit.messages import shown
 
 # If R_d ~ 1/r, the centre pixel at p = dr has 0.561 of F(dr), but only 1/pi of it from a flat
 # annulus. Relative error with 1, 8, 16, 32, 64 parts: .44, .0036, .0011, .00049, .00031 at F = 1 -
@@ -164,9 +165,9 @@ def checked_support(
     try:
         pitch_mm = float(mm_per_pixel)
         half = None if half_pixels is None else operator.index(half_pixels)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ProfileError(
-            f"mm_per_pixel = {mm_per_pixel!r}, half_pixels = {half_pixels!r}; "
+            f"mm_per_pixel = {shown(mm_per_pixel)}, half_pixels = {shown(half_pixels)}; "
             "expected a number and a whole number."
         ) from None
     if not (math.isfinite(pitch_mm) and pitch_mm > 0):
@@ -205,7 +206,10 @@ def energy_radii_mm(
     ``r_edges_mm`` (n+1,) and ``annulus_energy`` (n, C) are a profile's. Raises ProfileError for a
     share that is not above 0 and at most 1.
     """
-    for share in shares:
+    wanted = number_array("shares", shares, ProfileError)
+    if wanted.ndim != 1:
+        raise ProfileError(f"shares has shape {wanted.shape}; expected a list of shares.")
+    for share in wanted.tolist():
         if not 0.0 < share <= 1.0:
             raise ProfileError(f"share = {share}; expected a share above 0 and at most 1.")
     within = cumulative(annulus_energy)

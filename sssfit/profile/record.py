@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly, plain
+from sssfit.arrays import FloatArray, ReadOnly, is_whole, number_array, plain
 from sssfit.errors import MaterialError, ProfileError
 from sssfit.files import write_atomically
 from sssfit.material import Material
 from sssfit.material.checks import is_name
-from sssfit.messages import by_channel, counted, html_table, number, of_material, printable
+from sssfit.messages import by_channel, counted, html_table, number, of_material, printable, shown
 from sssfit.profile import checks, npz
 from sssfit.profile import pixels as integrals
 from sssfit.profile.directions import directed_figures
@@ -330,9 +330,9 @@ class Profile(ReadOnly):
         """Return F at any radius: exact at the edges, smooth and monotone between them.
 
         Takes radii (...) [mm] from 0 up and returns (..., C); beyond the last edge F keeps its last
-        value. Raises ProfileError for a radius that is negative or NaN.
+        value. Raises ProfileError for a radius that is negative, NaN or no number.
         """
-        radii_mm = np.minimum(np.asarray(r_mm, dtype=np.float64), self.r_edges_mm[-1])
+        radii_mm = np.minimum(number_array("r_mm", r_mm, ProfileError), self.r_edges_mm[-1])
         if not (radii_mm >= 0).all():
             raise ProfileError("r_mm holds a negative radius or NaN; expected radii from 0 up.")
         return integrals.cumulative_at(self.r_edges_mm, self.annulus_energy, radii_mm)
@@ -413,10 +413,10 @@ class Profile(ReadOnly):
         """
         if channel is None:
             energy = self.annulus_energy
-        elif channel in range(self.n_channels):
+        elif is_whole(channel) and channel in range(self.n_channels):
             energy = self.annulus_energy[:, channel : channel + 1]
         else:
-            raise ProfileError(f"channel = {channel}; expected 0 to {self.n_channels - 1}.")
+            raise ProfileError(f"channel = {shown(channel)}; expected 0 to {self.n_channels - 1}.")
         quadrant = integrals.quadrant_kernel(self.r_edges_mm, energy, mm_per_pixel, half_pixels)
         return quadrant if channel is None else quadrant[:, :, 0]
 
@@ -517,7 +517,7 @@ class Profile(ReadOnly):
         FileError
             The file cannot be written; an older file at ``path`` stays unchanged.
         """
-        write_atomically(Path(path), self.write)
+        write_atomically(path, self.write)
 
     @classmethod
     def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
@@ -533,7 +533,7 @@ class Profile(ReadOnly):
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the profile"
-        origin = printable(origin)
+        origin = printable(str(origin))
         arrays, meta = npz.unpack(source, origin)
         fields: dict[str, Any] = {"annulus_transmittance": None, **arrays, "meta": meta}
         try:

@@ -37,6 +37,8 @@ def source_indices(size: int, beyond: int, border: str) -> npt.NDArray[np.intp]:
     RenderError
         The border is unknown.
     """
+    if not isinstance(border, str):
+        raise RenderError(f"border = {shown(border)}; expected {', '.join(BORDERS)}.")
     place = np.arange(-beyond, size + beyond)
     if border == "mirror":  # with the period 2 n
         place %= 2 * size
@@ -45,7 +47,7 @@ def source_indices(size: int, beyond: int, border: str) -> npt.NDArray[np.intp]:
         return np.clip(place, 0, size - 1)
     if border == "zero":
         return np.where((place >= 0) & (place < size), place, size)
-    raise RenderError(f"border = {border!r}; expected {', '.join(BORDERS)}.")
+    raise RenderError(f"border = {shown(border)}; expected {', '.join(BORDERS)}.")
 
 
 # Limit of the work space: the reference of 4096 x 4096 RGB with a kernel of 8191 x 8191 pixels
@@ -79,25 +81,35 @@ def scene_for(scene: Scene, channels: Sequence[str]) -> Scene:
     return found
 
 
-def precision_for(dtype: npt.DTypeLike, scene: Scene) -> np.dtype[Any]:
+def precision_for(dtype: npt.DTypeLike, scene: Scene, gain: float) -> np.dtype[Any]:
     """Return the type that a scene is rendered in.
+
+    ``gain`` is the most by which sums of fetches exceed the light: twice where all weights are
+    positive, because mirrored fetches are added first.
 
     Raises
     ------
     RenderError
-        It is neither float32 nor float64, or the scene's light is above what float32 holds.
+        It is neither float32 nor float64, or the scene's light, or a sum of it, is above what the
+        type holds.
     """
     try:
         precision = np.dtype(dtype)
-    except TypeError:
+    except (TypeError, ValueError):
         raise RenderError(f"dtype = {shown(dtype)}; expected float32 or float64.") from None
     if precision not in (np.float32, np.float64):
         raise RenderError(f"dtype = {precision}; expected float32 or float64.")
-    most, brightest = np.finfo(precision).max, scene.irradiance.max()
+    most, brightest = float(np.finfo(precision).max), float(scene.irradiance.max())
     if brightest > most:
         raise RenderError(
             f"{scene.name}: light of {brightest:.3g} is above {most:.3g}, the largest number of "
             f"{precision}; render it as float64."
+        )
+    if brightest * gain > most:
+        remedy = "render it as float64" if precision == np.float32 else "scale it down"
+        raise RenderError(
+            f"{scene.name}: sums of light of {brightest:.3g} may be above {most:.3g}, the largest "
+            f"number of {precision}; {remedy}."
         )
     return precision
 

@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import is_number
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage
+from sssfit.messages import shown
 from sssfit.render.disk import gathered, turns
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -44,6 +46,8 @@ class Jitter:
     def __post_init__(self) -> None:
         for name, most in (("share", 1.0), ("scale", 1.0), ("degrees", 90.0)):
             value = getattr(self, name)
+            if not is_number(value):
+                raise RenderError(f"{name} = {shown(value)} of a jitter; expected 0 to {most:g}.")
             if not 0.0 <= value <= most or (name == "scale" and value == most):
                 raise RenderError(f"{name} = {value:g} of a jitter; expected 0 to {most:g}.")
 

@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.errors import RenderError
+from sssfit.messages import shown
 from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.profile.pixels import checked_support
@@ -54,6 +56,8 @@ def render_reference(
     RenderError
         The channels do not match, the border is unknown, or the memory limit is exceeded.
     """
+    if not isinstance(profile, Profile):
+        raise RenderError(f"profile = {shown(profile)}; expected a Profile.")
     scene = scene_for(scene, profile.channels)
     thread_count(threads)  # raises before the kernel's pixels are computed
     half = reference_half_pixels(profile, scene.mm_per_pixel, scene.height, scene.width)

@@ -27,7 +27,7 @@ from sssfit._jit import thread_pool
 from sssfit.arrays import FloatArray, read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 from sssfit.process import thread_count
 from sssfit.render.transmittance import transmitted
 from sssfit.scene.record import Scene
@@ -65,7 +65,7 @@ def make_view(
         ("lost", "mean" if lost is None else lost, LOST),
     ):
         if name not in known:
-            raise RenderError(f"{word} = {name!r}; expected one of {', '.join(known)}.")
+            raise RenderError(f"{word} = {shown(name)}; expected one of {', '.join(known)}.")
     mask = object_mask(scene)
     depth_mm = depths(scene, mask)
     sizes = _sizes(scale, mask.shape)

@@ -32,6 +32,7 @@ from sssfit.arrays import read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel
 from sssfit.kernel.taps import Stage, Taps
+from sssfit.messages import shown
 from sssfit.process import thread_count
 from sssfit.render.screen import (
     BORDER,
@@ -97,9 +98,9 @@ def render_screen_taps(
     scene = scene.for_channels(taps.channels)
     check_buffers(scene, channels)
     if follow not in FOLLOW:
-        raise RenderError(f"follow = {follow!r}; a table of taps has {' or '.join(FOLLOW)}.")
+        raise RenderError(f"follow = {shown(follow)}; a table of taps has {' or '.join(FOLLOW)}.")
     if border not in BORDER:
-        raise RenderError(f"border = {border!r}; expected {', '.join(BORDER)}.")
+        raise RenderError(f"border = {shown(border)}; expected {', '.join(BORDER)}.")
     store = store_of(intermediate, taps)
     workers = thread_count(threads)
     mask = object_mask(scene)

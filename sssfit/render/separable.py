@@ -62,7 +62,7 @@ def render_separable(
     """
     scene = scene_for(scene, kernel.channels)
     check_pitch(scene, kernel)
-    precision = precision_for(dtype, scene)
+    precision = precision_for(dtype, scene, _gain(kernel))
     # Two passes, the result and, in float32, a copy of the picture.
     samples = scene.height * scene.width * len(kernel.channels)
     check_memory(
@@ -73,6 +73,12 @@ def render_separable(
     pixels = scene.irradiance.astype(precision, copy=False)
     signs = kernel.signs * kernel.scale
     return apply_passes(pixels, kernel.weights, signs, border=border, threads=threads)
+
+
+def _gain(kernel: SeparableKernel) -> float:
+    """Return how many times the light the sums of a picture's passes can be."""
+    sums = np.maximum(np.abs(kernel.weights).sum(axis=1), 1.0)
+    return 2.0 * float((kernel.scale * sums**2).sum(axis=0).max(initial=1.0))
 
 
 def check_pitch(scene: Scene, kernel: SeparableKernel) -> None:

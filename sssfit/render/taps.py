@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
+from sssfit.messages import shown
 from sssfit.render.borders import check_memory, precision_for, scene_for, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
 from sssfit.render.disk import all_turns, apply_disk
@@ -90,13 +91,15 @@ def render_taps(
     """
     channels = len(taps.channels)
     scene = scene_for(scene, taps.channels)
-    precision = precision_for(dtype, scene)
+    precision = precision_for(dtype, scene, _gain(taps))
     size = scene.height, scene.width
     check_memory(
         6.0 * scene.height * scene.width * channels * precision.itemsize,
         f"{scene.name}: {scene.height} x {scene.width} pixels",
         "render a part of the picture",
     )
+    if not isinstance(jitter, Jitter | None):
+        raise RenderError(f"jitter = {shown(jitter)}; expected a Jitter or None.")
     pixels = np.empty((*size, channels), precision)
     pixels[...] = scene.irradiance
     store = store_of(intermediate, taps)
@@ -198,6 +201,15 @@ def _unchained(
     for stage, share in zip(taps.stages, blend[1:], strict=True):
         found += share * passes.blurred(pixels, stage, pitch_mm)
     return passes.shown(found)
+
+
+def _gain(taps: Taps) -> float:
+    """Return how many times the light the sums of a picture's passes can be."""
+    gain = 2.0 * max(1.0, float(np.abs(taps.blend).sum(axis=0).max()))
+    for each in taps.stages:
+        sums = np.abs(each.weights[0]) + each.copies * np.abs(each.weights[1:]).sum(axis=0)
+        gain *= max(1.0, float(sums.max())) ** 2  # of both passes of a pair
+    return gain
 
 
 def _chained(

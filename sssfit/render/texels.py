@@ -54,7 +54,7 @@ def store_of(intermediate: str | None, taps: Taps) -> Store | None:
     """
     if intermediate is None:
         return None
-    if intermediate not in BYTES:
+    if not isinstance(intermediate, str) or intermediate not in BYTES:
         raise RenderError(f"intermediate = {shown(intermediate)}; expected {', '.join(BYTES)}.")
     if intermediate in _UNSIGNED:
         _check_unsigned(intermediate, taps)

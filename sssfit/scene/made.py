@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sssfit.errors import ArgumentError
+from sssfit.messages import shown
 from sssfit.methods import Method, Setting
 
 if TYPE_CHECKING:
@@ -105,13 +106,15 @@ def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **opt
     """
     from sssfit.errors import RenderError
 
-    if name not in MADE:
-        raise RenderError(f"no made picture {name!r}; expected one of {', '.join(MADE)}.")
+    if not isinstance(name, str) or name not in MADE:
+        raise RenderError(f"no made picture {shown(name)}; expected one of {', '.join(MADE)}.")
     known = options_of(name)
     given = {key: value for key, value in options.items() if value is not None}
     for key in given:
         if key not in known:
-            raise RenderError(f"{name}: no option {key!r}; expected one of {', '.join(known)}.")
+            raise RenderError(
+                f"{name}: no option {shown(key)}; expected one of {', '.join(known)}."
+            )
     scene: Scene = MADE[name].load()(height=height, width=width, mm_per_pixel=mm_per_pixel, **given)
     return scene
 
@@ -132,7 +135,7 @@ def check_pictures(
     for name in names:
         if not name or (name not in MADE and not Path(name).exists()):
             raise ArgumentError(
-                f"there is no picture {name!r}; expected {', '.join(MADE)}, or your own file."
+                f"there is no picture {shown(name)}; expected {', '.join(MADE)}, or your own file."
             )
     files = [name for name in names if name not in MADE]
     if size is not None and len(files) == len(names):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly
+from sssfit.arrays import FloatArray, ReadOnly, check_label, number_array
 from sssfit.errors import RenderError, SssfitWarning
 from sssfit.messages import counted
 
@@ -49,6 +49,7 @@ class Mesh(ReadOnly):
     normals: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        check_label("name", self.name, RenderError)
         points = self._numbers("positions_mm", self.positions_mm, 3)
         if self.uv is None:
             raise RenderError(
@@ -70,7 +71,7 @@ class Mesh(ReadOnly):
     def _numbers(
         self, field: str, given: npt.ArrayLike, columns: int, rows: int | None = None
     ) -> FloatArray:
-        values = np.array(given, dtype=np.float64)
+        values = number_array(f"{self.name}: {field}", given, RenderError)
         if values.ndim != 2 or values.shape[1] != columns or len(values) == 0:
             raise RenderError(
                 f"{self.name}: {field} has shape {values.shape}; expected vertices and {columns} "
@@ -89,7 +90,10 @@ class Mesh(ReadOnly):
         return values
 
     def _checked_faces(self, points: FloatArray) -> IndexArray:
-        given = np.asarray(self.faces)
+        try:
+            given = np.asarray(self.faces)
+        except ValueError:  # rows of different lengths
+            given = np.array(None)
         if given.ndim != 2 or given.shape[1:] != (3,) or given.dtype.kind not in "iu":
             raise RenderError(
                 f"{self.name}: faces has shape {given.shape} of {given.dtype}; expected triangles "

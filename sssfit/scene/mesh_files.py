@@ -7,7 +7,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FileError, RenderError
-from sssfit.files import reason
+from sssfit.files import path_of, reason
 from sssfit.messages import shown
 from sssfit.scene.mesh import IndexArray, Mesh, smooth_normals
 
@@ -31,7 +31,7 @@ def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
     RenderError
         It has no triangles or no texture coordinates, or they are invalid.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.suffix.lower() not in FORMATS:
         raise FileError(f"{path}: expected a mesh of {', '.join(FORMATS)}.")
     if not 0.0 < mm_per_unit < np.inf:

@@ -5,7 +5,7 @@ Border pixels of a white shape on black hold exactly the covered share of their 
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, is_whole
+from sssfit.arrays import FloatArray, is_number, is_whole
 from sssfit.errors import RenderError
 from sssfit.messages import shown
 from sssfit.scene.record import Scene
@@ -30,17 +30,25 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
             raise RenderError(
                 f"{name}: {word} = {shown(value)}; expected a whole number, 1 or more."
             )
-    if height * width > MAX_PIXELS:
+    if (many := min(height * width, 10**300)) > MAX_PIXELS:  # a float has no larger ones
         raise RenderError(
-            f"{name}: {width} x {height} pixels would take {height * width * 120e-9:.3g} GB to "
+            f"{name}: {shown(width)} x {shown(height)} pixels would take {many * 120e-9:.3g} GB to "
             f"render; make it no larger than {MAX_PIXELS:.0e} pixels."
         )
     check_above(name, "mm_per_pixel", mm_per_pixel, 0.0)
     check_range(name, "mm_per_pixel", mm_per_pixel, _MIN_MM, _MAX)
 
 
+def as_number(name: str, option: str, value: object) -> float:
+    """Return a number as a float; refuse what is none."""
+    if not is_number(value):
+        raise RenderError(f"{name}: {option} = {shown(value)}; expected a number.")
+    return float(value)
+
+
 def check_above(name: str, option: str, value: float, least: float) -> None:
     """Check for a number above ``least`` that can be counted in pixels."""
+    value = as_number(name, option, value)
     if not least < value <= _MAX:
         raise RenderError(
             f"{name}: {option} = {value:g}; expected a number above {least:g}, up to {_MAX:g}."
@@ -49,12 +57,14 @@ def check_above(name: str, option: str, value: float, least: float) -> None:
 
 def check_range(name: str, option: str, value: float, low: float, high: float) -> None:
     """Check for a number from ``low`` to ``high``."""
+    value = as_number(name, option, value)
     if not low <= value <= high:
         raise RenderError(f"{name}: {option} = {value:g}; expected {low:g} to {high:g}.")
 
 
 def check_finite(name: str, option: str, value: float) -> None:
     """Check for a finite number that can be counted in pixels."""
+    value = as_number(name, option, value)
     if not abs(value) <= _MAX:
         raise RenderError(
             f"{name}: {option} = {value:g}; expected a finite number, up to {_MAX:g}."

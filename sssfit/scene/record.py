@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly, check_label
+from sssfit.arrays import FloatArray, ReadOnly, check_label, is_whole
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light, names_for, positive, true_or_false
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 
 if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
@@ -210,7 +210,9 @@ class Scene(ReadOnly):
         return dataclasses.replace(self, **light, channel_names=tuple(names))
 
     def corner(self, pixels: int) -> "Scene":
-        """Return the upper left corner of the scene with this height and width."""
+        """Return the upper left corner of the scene with this height and width, or all there is."""
+        if not is_whole(pixels) or pixels < 1:
+            raise RenderError(f"pixels = {shown(pixels)}; expected a whole number from 1 up.")
         buffers: dict[str, Any] = {
             field.name: value[:pixels, :pixels]
             for field in dataclasses.fields(self)

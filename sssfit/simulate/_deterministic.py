@@ -18,6 +18,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
+from sssfit.messages import shown
 from sssfit.profile import FORMAT, Profile
 
 ROUNDING = 1e-12  # F may fall by this share of the total: rounding of sums of a few thousand terms
@@ -220,5 +221,5 @@ def check_is_material(material: object) -> None:
     """Raise an error for a name or a path, which must be loaded first."""
     if not isinstance(material, Material):
         raise SimulationError(
-            f"{material!r} is not a Material; load one with sssfit.material.load_material."
+            f"{shown(material)} is not a Material; load one with sssfit.material.load_material."
         )

@@ -14,6 +14,7 @@ from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
+from sssfit.messages import shown
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.profile.beam import Beam, wider_edges
@@ -152,7 +153,7 @@ def whole_number(name: str, value: int) -> int:
     try:
         return operator.index(value)
     except TypeError:
-        raise SimulationError(f"{name} = {value!r}; give a whole number.") from None
+        raise SimulationError(f"{name} = {shown(value)}; give a whole number.") from None
 
 
 def provenance(

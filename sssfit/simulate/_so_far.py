@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 
 from sssfit._jit import source_key
 from sssfit.errors import MaterialError, SimulationError
+from sssfit.files import source_of
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.messages import shown
@@ -76,8 +77,9 @@ def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) ->
         The file is missing, damaged, edited, foreign, of another format, or was saved before
         checkpoints stored their materials; the one-line message names the origin.
     """
-    if isinstance(source, str | Path):
-        source, origin = Path(source), origin or str(source)
+    source = source_of(source)
+    if isinstance(source, Path):
+        origin = origin or str(source)
     with open_checkpoint(source, origin or "the checkpoint") as archive:
         meta = read_meta(archive)
         walk = _walk_of(meta)

@@ -16,7 +16,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.grid import make_grid
 from sssfit.material import Layer, Material
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 from sssfit.profile import Profile
 from sssfit.shapes import (
     diffusion_beyond,
@@ -87,7 +87,7 @@ def simulate_burley(
     """
     layer = half_space(material, "burley")
     if mapping not in MAPPINGS:
-        raise SimulationError(f"mapping = {mapping!r}; expected one of {', '.join(MAPPINGS)}.")
+        raise SimulationError(f"mapping = {shown(mapping)}; expected one of {', '.join(MAPPINGS)}.")
     total = _reflectance(material, layer, reflectance)
     s_per_mm = MAPPINGS[mapping](total) * _scale_per_mm(material, layer, mapping)
     grid = make_grid(material, dr_mm=dr_mm, radius_mm=radius_mm)
@@ -112,7 +112,7 @@ def _reflectance(material: Material, layer: Layer, given: npt.ArrayLike | None) 
         total = np.full(1, np.nan)
     if not ((total >= 0.0) & (total <= 1.0)).all():
         raise SimulationError(
-            f"reflectance = {given!r}; expected a number from 0 to 1 for each of "
+            f"reflectance = {shown(given)}; expected a number from 0 to 1 for each of "
             f"{counted(material.n_channels, 'channel')}."
         )
     return total

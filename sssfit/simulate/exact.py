@@ -14,9 +14,11 @@ from itertools import compress
 from typing import Any
 
 from sssfit._jit import depth_matrix, thread_pool
+from sssfit.arrays import is_number, is_whole
 from sssfit.errors import SimulationError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Layer, Material
+from sssfit.messages import shown
 from sssfit.process import available_cores, one_blas_thread
 from sssfit.profile import Profile
 from sssfit.simulate import half_space
@@ -183,9 +185,9 @@ def _isotropic(material: Material) -> Material:
 
 def _check_settings(materials: Sequence[Material], tolerance: float, threads: int) -> None:
     """Check the settings; each error is one line."""
-    if not 0.0 < tolerance < 1.0:
-        raise SimulationError(f"tolerance = {tolerance}; give a share of the total, 0 to 1.")
-    if threads < 1:
-        raise SimulationError(f"threads = {threads}; give at least 1.")
+    if not is_number(tolerance) or not 0.0 < tolerance < 1.0:
+        raise SimulationError(f"tolerance = {shown(tolerance)}; give a share of the total, 0 to 1.")
+    if not is_whole(threads) or threads < 1:
+        raise SimulationError(f"threads = {shown(threads)}; give at least 1.")
     for material in materials:
         check_is_material(material)

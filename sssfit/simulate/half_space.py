@@ -30,6 +30,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
+from sssfit.messages import shown
 from sssfit.optics import entering_of_diffuse, normal_transmittance
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
@@ -142,7 +143,7 @@ def diffuse_reflectance(
     """
     albedos = np.atleast_1d(np.asarray(albedo, dtype=np.float64))
     if not ((albedos >= 0.0) & (albedos <= 1.0)).all():
-        raise SimulationError(f"albedo = {albedo!r}; expected numbers from 0 to 1.")
+        raise SimulationError(f"albedo = {shown(albedo)}; expected numbers from 0 to 1.")
     _check_light(eta, light)
     eta, level = float(eta), _LEVELS[3]
     with one_blas_thread():
@@ -344,7 +345,7 @@ def _check_light(eta: float, light: str) -> None:
     if not 1.0 <= eta <= _LARGEST_ETA:
         raise SimulationError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
     if light not in LIGHTS:
-        raise SimulationError(f"light = {light!r}; expected {' or '.join(LIGHTS)}.")
+        raise SimulationError(f"light = {shown(light)}; expected {' or '.join(LIGHTS)}.")
 
 
 def _rounded_up(value: float) -> float:

@@ -382,7 +382,7 @@ def _reachable(reflectance: npt.ArrayLike, eta: float, light: str) -> FloatArray
     if asked.ndim > 1 or asked.size == 0:
         raise MaterialError(f"reflectance has shape {asked.shape}; expected one number a channel.")
     if light not in LIGHTS:
-        raise MaterialError(f"light = {light!r}; expected {' or '.join(LIGHTS)}.")
+        raise MaterialError(f"light = {shown(light)}; expected {' or '.join(LIGHTS)}.")
     # A material may have less, but the exact solver does not accept less.
     if number("eta", eta) < 1.0:
         raise MaterialError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")

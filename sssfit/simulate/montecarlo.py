@@ -21,6 +21,7 @@ from sssfit._jit import half_space_walk, layered_walk
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
+from sssfit.messages import shown
 from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
@@ -196,7 +197,7 @@ def simulate_montecarlo_many(
     auto = radius_mm == "auto"
     if isinstance(radius_mm, str):
         if not auto:
-            raise SimulationError(f'radius_mm = {radius_mm!r}; give a length in mm or "auto".')
+            raise SimulationError(f'radius_mm = {shown(radius_mm)}; give a length in mm or "auto".')
         grids = _auto_grids(materials, dr_mm, seed, threads, stop)
     else:
         grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
@@ -227,7 +228,7 @@ def check_media(materials: Sequence[Material]) -> None:
     for material in materials:
         if not isinstance(material, Material):
             raise SimulationError(
-                f"{material!r} is not a Material; load one with sssfit.material.load_material."
+                f"{shown(material)} is not a Material; load one with sssfit.material.load_material."
             )
         every_g = np.concatenate([layer.g for layer in material.layers])
         for g in every_g[(every_g < MIN_G) | (every_g > MAX_G)].tolist():

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sssfit.errors import PlanError, SssfitError
+from sssfit.files import path_of
 from sssfit.material import Material, load_material
 from sssfit.messages import did_you_mean, printable, shown
 from sssfit.sweep.axes import read_axis
@@ -30,7 +31,8 @@ def load_plan(path: str | Path, *, seed: int | None = None) -> Plan:
     PlanError
         The file cannot be read, or it or a point is invalid; the message begins with its name.
     """
-    path, origin = Path(path), printable(str(path))
+    path = path_of(path, PlanError)
+    origin = printable(str(path))
     if origin == "-":
         raise PlanError(
             "- is stdin, and what a plan names lies in the plan's own folder; give the path of a "

@@ -7,9 +7,9 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sssfit.errors import FileError, SweepError
-from sssfit.files import locked
-from sssfit.messages import note
+from sssfit.errors import FileError, PlanError, SweepError
+from sssfit.files import locked, path_of
+from sssfit.messages import note, shown
 from sssfit.simulate.batches import Tally, code_version
 from sssfit.sweep.made import make_store, restore
 from sssfit.sweep.needed import needed
@@ -72,7 +72,9 @@ def sweep_to_store(
         A point's material is invalid.
     """
     needed("zarr", "sweep")
-    path, begun = Path(path), time.perf_counter()
+    path, begun = path_of(path), time.perf_counter()
+    if not isinstance(plan, Plan):
+        raise PlanError(f"plan = {shown(plan)}; expected a Plan; sssfit.sweep.load_plan reads one.")
     _ = plan.grid  # every point is checked before anything is written
     exists = _check_path(path, resume=resume, force=force)
     with locked(path), pool_for(plan, threads, scheduler) as pool:

@@ -8,7 +8,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.compare.swatches import Swatches
 from sssfit.errors import ArgumentError, FileError, SweepError
-from sssfit.files import reason
+from sssfit.files import path_of, reason
 from sssfit.messages import printable
 from sssfit.sweep.needed import needed
 from sssfit.sweep.store import is_store
@@ -36,7 +36,8 @@ def read_swatches(path: str | Path) -> Swatches:
     FileError
         The folder is no store of a sweep, or is damaged.
     """
-    path, shown = Path(path), printable(str(path))
+    path = path_of(path)
+    shown = printable(str(path))
     if not is_store(path):
         raise FileError(f"{shown} is a folder; name a file in it, or the store of a sweep.")
     zarr = needed("zarr", "sweep")
