@@ -146,6 +146,25 @@ def test_objects_of_a_file_are_one_mesh_and_vertices_on_a_seam_are_apart(tmp_pat
     assert np.ptp(mesh.normals[on_seam], axis=0).max() < 1e-12
 
 
+@pytest.mark.parametrize(("shift", "tiles"), [(0.4, 1), (0.0, 2)])
+def test_materials_keep_their_texture_coordinates_or_take_a_tile_each(tmp_path, shift, tiles):
+    """They overlap where each has a texture of its own; trimesh packs them into a few texels."""
+    (tmp_path / "two.mtl").write_text("newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n")
+    extra = [f"v {x} {y} 5" for x, y, _ in POINTS] + [f"vt {u} {v + shift}" for u, v in UV]
+    extra += ["usemtl b", "f 5/5 6/6 7/7", "f 5/5 7/7 8/8"]
+    path = tmp_path / "two.obj"
+    path.write_bytes(b"mtllib two.mtl\nusemtl a\n" + obj(extra="\n".join(extra)))
+    mesh = load_mesh(path)
+    is_second = mesh.positions_mm[:, 2] > 1.0
+    for which, moved in ((~is_second, 0.0), (is_second, shift)):
+        columns, rows = (mesh.uv[which] * tiles).T
+        assert sorted((columns % 1.0).round(6)) == [0.25, 0.25, 0.75, 0.75]
+        expected = sorted([0.25 + moved, 0.25 + moved, 0.5 + moved, 0.5 + moved])
+        np.testing.assert_allclose(sorted(rows % 1.0), expected)
+    corners = {tuple(each) for each in mesh.uv.round(6)}
+    assert len(corners) == 8  # no texel is both's
+
+
 @pytest.mark.parametrize(
     ("name", "content", "error", "said"),
     [
