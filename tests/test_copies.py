@@ -50,6 +50,17 @@ def arrays_of(value, path=""):
     }
 
 
+@pytest.mark.parametrize("name", ["scene", "image", "mesh"])
+def test_records_of_pictures_say_in_a_line_what_they_are(name):
+    said = repr(RECORDS[name]())
+    expected = {
+        "scene": "<Scene head: 16 x 24 pixels of 9 mm, 1 channel, with depth, mask, specular>",
+        "image": "<Image '': 2 x 2 pixels, channels 'R, G, B'>",
+        "mesh": "<Mesh 'one': 1 triangle in 1 x 1 x 0.7 mm>",
+    }
+    assert said == expected[name]
+
+
 @pytest.mark.parametrize("name", RECORDS)
 def test_copies_are_the_same_and_as_fixed(name):
     record = RECORDS[name]()

@@ -420,6 +420,12 @@ class Image(ReadOnly):
         for field, value in kept.items():
             object.__setattr__(self, field, value)
 
+    def __repr__(self) -> str:
+        height, width = self.pixels.shape[:2]
+        size = "" if self.mm_per_pixel is None else f" of {self.mm_per_pixel:.4g} mm"
+        names = shown(", ".join(self.channels))
+        return f"<Image {shown(self.name)}: {width} x {height} pixels{size}, channels {names}>"
+
     def _store(self, field: str, dimensions: int) -> None:
         """Store an array read-only, in C order."""
         kept = np.array(as_light(getattr(self, field), field), order="C")

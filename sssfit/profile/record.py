@@ -23,7 +23,16 @@ from sssfit.errors import MaterialError, ProfileError
 from sssfit.files import write_atomically
 from sssfit.material import Material
 from sssfit.material.checks import is_name
-from sssfit.messages import by_channel, counted, html_table, number, of_material, printable, shown
+from sssfit.messages import (
+    SHARE,
+    by_channel,
+    counted,
+    html_table,
+    number,
+    of_material,
+    printable,
+    shown,
+)
 from sssfit.profile import checks, npz
 from sssfit.profile import pixels as integrals
 from sssfit.profile.directions import directed_figures
@@ -123,7 +132,7 @@ class Profile(ReadOnly):
         columns = (
             (self.diffuse_reflectance, ".6f"),
             (self.diffuse_reflectance_stderr, ".2g"),
-            (self.beyond_grid, ".6f"),
+            (self.beyond_grid, SHARE),
             (self.energy_radii_mm([0.5])[0], ".4g"),
         )
         rows = [

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray, ReadOnly, check_label, number_array
 from sssfit.errors import RenderError, SssfitWarning
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 
 IndexArray = npt.NDArray[np.int64]
 
@@ -67,6 +67,10 @@ class Mesh(ReadOnly):
         self._set("uv", uv)
         self._set("faces", faces)
         self._set("normals", self._unit_normals(points, faces))
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{each:.4g}" for each in np.ptp(self.positions_mm, axis=0))
+        return f"<Mesh {shown(self.name)}: {counted(len(self.faces), 'triangle')} in {size} mm>"
 
     def _numbers(
         self, field: str, given: npt.ArrayLike, columns: int, rows: int | None = None

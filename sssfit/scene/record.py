@@ -10,13 +10,14 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray, ReadOnly, check_label, is_whole
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light, names_for, positive, true_or_false
-from sssfit.messages import counted, shown
+from sssfit.messages import counted, printable, shown
 
 if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
 
 
 _MAX_OBJECTS = 2**31 - 1  # largest number of 32 bits
+_LONGEST = 60  # characters of a name in a repr
 _HALF = 0.5  # of coverage: a pixel on an outline belongs to the object that covers more of it
 _WITH_CHANNELS = ("irradiance", "specular", "back_irradiance")
 
@@ -139,6 +140,20 @@ class Scene(ReadOnly):
             self._store(field, np.float64)
         self._store("alpha", np.float64)
         self._store("mask", np.int32)
+
+    def __repr__(self) -> str:
+        name = printable(self.name)
+        buffers = [
+            each.name.removesuffix("_mm").replace("_", " ")
+            for each in dataclasses.fields(self)
+            if each.name != "irradiance" and isinstance(getattr(self, each.name), np.ndarray)
+        ]
+        more = f", with {', '.join(buffers)}" if buffers else ""
+        return (
+            f"<Scene {name if len(name) <= _LONGEST else name[: _LONGEST - 3] + '...'}: "
+            f"{self.width} x {self.height} pixels of {self.mm_per_pixel:.4g} mm, "
+            f"{counted(self.channels, 'channel')}{more}>"
+        )
 
     def _checked_words(self, channels: int) -> dict[str, Any]:
         """Return the fields that are no buffers, as stored."""
