@@ -260,9 +260,11 @@ def test_g_of_one_is_no_scattering_and_n_below_one_stays():
 
 
 def test_missing_files_and_folders(tmp_path):
-    for path in (tmp_path / "none.mci", tmp_path, "nu\0ll.mci"):
+    for path in (tmp_path / "none.mci", tmp_path):
         with pytest.raises(MaterialError, match="cannot be read"):
             load_mci(path)
+    with pytest.raises(MaterialError, match=r"^'nu\\x00ll.mci' holds a null character, which"):
+        load_mci("nu\0ll.mci")
 
 
 def test_flipped_characters_are_refused_in_one_line_or_make_another_file():

@@ -138,6 +138,15 @@ def test_wrong_fields(record):
             refused(lambda **given: dataclasses.replace(record, **given), **{field.name: wrong})
 
 
+def test_light_near_the_largest_number_is_summed_or_refused():
+    """Mirrored pixels are added first, and 3e38 twice is infinite in float32; a disk has none."""
+    near = 3.0e38 * LIGHT
+    assert np.isfinite(sssfit.render(1e-2 * near, KERNEL, dtype=np.float32)).all()
+    assert np.isfinite(sssfit.render(near, TAPS, dtype=np.float32)).all()
+    with pytest.raises(SssfitError, match=r"are above .* of float32; render it as float64"):
+        sssfit.render(near, KERNEL, dtype=np.float32)
+
+
 @pytest.mark.parametrize("seed", [1.5, -1, "1", True])
 def test_seeds_of_fits(seed):
     with pytest.raises(FitError, match="seed = "):

@@ -14,6 +14,8 @@ from sssfit.scene.record import Scene
 # light is lost; clamp repeats only the pixel at the rim ("edge"); zero is black.
 BORDERS = ("mirror", "clamp", "zero")
 
+FloatArray = npt.NDArray[np.floating[Any]]
+
 
 def source_indices(size: int, beyond: int, border: str) -> npt.NDArray[np.intp]:
     """Return the source pixel at each place of a line that continues past both its ends.
@@ -81,17 +83,13 @@ def scene_for(scene: Scene, channels: Sequence[str]) -> Scene:
     return found
 
 
-def precision_for(dtype: npt.DTypeLike, scene: Scene, gain: float) -> np.dtype[Any]:
+def precision_for(dtype: npt.DTypeLike, scene: Scene) -> np.dtype[Any]:
     """Return the type that a scene is rendered in.
-
-    ``gain`` is the most by which sums of fetches exceed the light: twice where all weights are
-    positive, because mirrored fetches are added first.
 
     Raises
     ------
     RenderError
-        It is neither float32 nor float64, or the scene's light, or a sum of it, is above what the
-        type holds.
+        It is neither float32 nor float64, or the scene's light is above what float32 holds.
     """
     try:
         precision = np.dtype(dtype)
@@ -105,13 +103,23 @@ def precision_for(dtype: npt.DTypeLike, scene: Scene, gain: float) -> np.dtype[A
             f"{scene.name}: light of {brightest:.3g} is above {most:.3g}, the largest number of "
             f"{precision}; render it as float64."
         )
-    if brightest * gain > most:
-        remedy = "render it as float64" if precision == np.float32 else "scale it down"
-        raise RenderError(
-            f"{scene.name}: sums of light of {brightest:.3g} may be above {most:.3g}, the largest "
-            f"number of {precision}; {remedy}."
-        )
     return precision
+
+
+def check_sums(picture: FloatArray, scene: Scene, gain: float) -> FloatArray:
+    """Return a rendered picture, or raise RenderError if sums of its light were infinite.
+
+    ``gain`` is the most by which sums of fetches exceed the light: twice where all weights are
+    positive, because mirrored fetches are added first. Only light near the limit is looked at.
+    """
+    most, brightest = float(np.finfo(picture.dtype).max), float(scene.irradiance.max())
+    if brightest * gain > most and not np.isfinite(picture).all():
+        remedy = "render it as float64" if picture.dtype == np.float32 else "scale it down"
+        raise RenderError(
+            f"{scene.name}: sums of light of {brightest:.3g} are above {most:.3g}, the largest "
+            f"number of {picture.dtype}; {remedy}."
+        )
+    return picture
 
 
 def check_memory(needed_bytes: float, what: str, remedy: str) -> None:

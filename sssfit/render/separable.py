@@ -17,7 +17,7 @@ from sssfit.arrays import read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.process import thread_count
-from sssfit.render.borders import check_memory, precision_for, scene_for, source_indices
+from sssfit.render.borders import check_memory, check_sums, precision_for, scene_for, source_indices
 from sssfit.scene.record import Scene
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -62,7 +62,7 @@ def render_separable(
     """
     scene = scene_for(scene, kernel.channels)
     check_pitch(scene, kernel)
-    precision = precision_for(dtype, scene, _gain(kernel))
+    precision = precision_for(dtype, scene)
     # Two passes, the result and, in float32, a copy of the picture.
     samples = scene.height * scene.width * len(kernel.channels)
     check_memory(
@@ -72,7 +72,8 @@ def render_separable(
     )
     pixels = scene.irradiance.astype(precision, copy=False)
     signs = kernel.signs * kernel.scale
-    return apply_passes(pixels, kernel.weights, signs, border=border, threads=threads)
+    picture = apply_passes(pixels, kernel.weights, signs, border=border, threads=threads)
+    return check_sums(picture, scene, _gain(kernel))
 
 
 def _gain(kernel: SeparableKernel) -> float:

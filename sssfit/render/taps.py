@@ -21,7 +21,7 @@ import numpy.typing as npt
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.messages import shown
-from sssfit.render.borders import check_memory, precision_for, scene_for, source_indices
+from sssfit.render.borders import check_memory, check_sums, precision_for, scene_for, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
 from sssfit.render.disk import all_turns, apply_disk
 from sssfit.render.jitter import Jitter, apply_jittered
@@ -91,7 +91,7 @@ def render_taps(
     """
     channels = len(taps.channels)
     scene = scene_for(scene, taps.channels)
-    precision = precision_for(dtype, scene, _gain(taps))
+    precision = precision_for(dtype, scene)
     size = scene.height, scene.width
     check_memory(
         6.0 * scene.height * scene.width * channels * precision.itemsize,
@@ -111,10 +111,11 @@ def render_taps(
         return add_up(passes, picture, taps, taps.blend.astype(precision), scene.mm_per_pixel)
 
     if covered is None or not taps.has_negative_weights:
-        return blurred(pixels, covered)
+        return check_sums(blurred(pixels, covered), scene, _gain(taps))
     light = blurred(pixels * covered, None)
     part = blurred(np.broadcast_to(covered, pixels.shape), None)
-    return divided_once(light, part, pixels, covered, taps.energy.astype(precision))
+    whole = divided_once(light, part, pixels, covered, taps.energy.astype(precision))
+    return check_sums(whole, scene, _gain(taps))
 
 
 def divided_once(
