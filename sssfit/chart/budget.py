@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from sssfit.chart.page import COLOURS, Style, drawable, name_axes, new_page, tick
+from sssfit.chart.looks import BLUE, DASHED, GREEN, GREY, ORANGE, PURPLE, SKY, series
+from sssfit.chart.page import Style, drawable, name_axes, new_page, tick
 from sssfit.chart.text import count, shortened
 from sssfit.kernel import Taps
 from sssfit.messages import counted
@@ -29,15 +30,14 @@ _LEAST = 1e-4  # Delta E, or relative L2 in percent: smaller ones are drawn at t
 _WRITTEN_PERCENT = 6.0  # smallest share with room for its figure in the bar
 # Okabe and Ito 2008, "Color Universal Design", with hatches that distinguish them in grey.
 _FILLS = (
-    ("#0072b2", ""),
-    ("#e69f00", "////"),
-    ("#56b4e9", ".."),
-    ("#cc79a7", "xx"),
-    ("#009e73", "\\\\\\\\"),
+    (BLUE, ""),
+    (ORANGE, "////"),
+    (SKY, ".."),
+    (PURPLE, "xx"),
+    (GREEN, "\\\\\\\\"),
     ("#bbbbbb", ""),
 )
-_MARKERS = "os^Dv"
-_PICTURES = (*COLOURS, "#cc79a7", "#444444")
+_MOST_PICTURES = 5
 _NOTES = (
     "Alone: one cause switched on against the exact profile's whole 2D kernel. Filled: mean over "
     "the picture; hollow: 99th percentile. In brackets: alternatives, not in the kernel's error.",
@@ -62,7 +62,7 @@ def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
         have no colour.
     """
     given = list(budgets) if isinstance(budgets, Sequence) else [budgets]
-    shown, names = given[: len(_MARKERS)], _names(given[0])
+    shown, names = given[:_MOST_PICTURES], _names(given[0])
     bars, rows = _BAR_INCHES * len(shown), _ROW_INCHES * len(names)
     notes = [*_NOTES, *_left_out(given)]
     title, subtitle = _title(given[0]), _subtitle(given[0])
@@ -124,7 +124,7 @@ def _draw_shares(axes: Axes, budgets: Sequence[Budget]) -> None:
             ends[side] += percent
     axes.set_ylim(len(budgets) - 0.5, -0.5)
     axes.set_yticks(range(len(budgets)), [drawable(shortened(b.scene.name, 24)) for b in budgets])
-    axes.axvline(0.0, color="#444444", lw=0.6)
+    axes.axvline(0.0, color=GREY, lw=0.6)
     axes.grid(visible=False, axis="y")
     tick(axes.xaxis)
     name_axes(axes, "", "share of the squared error (%)", "")
@@ -150,7 +150,7 @@ def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str
             values = _figures(_cause(budget, name), is_seen=is_seen)
             place = row + 0.7 * (k - 0.5 * (len(budgets) - 1)) / len(budgets)
             drawn = [max(each, _LEAST) for each in values]
-            line: Style = {"color": _PICTURES[k], "marker": _MARKERS[k], "markersize": 4.5, "lw": 0}
+            line: Style = {**series(k, 4.5), "lw": 0}
             axes.plot(drawn[:1], [place], clip_on=False, zorder=3, **line)
             axes.plot(drawn[1:], [place] * (len(drawn) - 1), mfc="white", clip_on=False, **line)
     axes.set_xscale("log")
@@ -159,11 +159,11 @@ def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str
     axes.set_yticks(range(len(names)), [text for _, text in names])
     axes.xaxis.set_major_formatter("{x:g}")
     if is_seen:
-        axes.axvline(1.0, color="#444444", lw=0.8, ls=(0, (4, 1.6)), zorder=1)
-    unit = "Delta E 2000 (dashed: 1)" if is_seen else "relative L2 (%)"
+        axes.axvline(1.0, color=GREY, lw=0.8, ls=DASHED, zorder=1)
+    unit = "ΔE 2000 (dashed: 1)" if is_seen else "relative L2 (%)"
     name_axes(axes, "", f"{unit}; smaller than {_LEAST:g} at the left edge", "")
     handles = [
-        Line2D([], [], lw=0, color=_PICTURES[k], marker=_MARKERS[k], markersize=4.5, label=label)
+        Line2D([], [], lw=0, label=label, **series(k, 4.5))
         for k, label in enumerate(drawable(shortened(b.scene.name, 24)) for b in budgets)
     ]
     _legend(axes, "(b) each cause alone", handles, len(handles))
@@ -204,5 +204,5 @@ def _is_part(budget: Budget, name: str) -> bool:
 
 def _left_out(budgets: Sequence[Budget]) -> list[str]:
     """Return a note on the number of pictures that are not drawn."""
-    more = len(budgets) - len(_MARKERS)
+    more = len(budgets) - _MOST_PICTURES
     return [f"Not drawn: {counted(more, 'more picture')}."] if more > 0 else []

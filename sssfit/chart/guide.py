@@ -17,8 +17,9 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
 from sssfit.arrays import FloatArray
+from sssfit.chart.looks import METHODS
 from sssfit.chart.page import (
-    COLOURS,
+    LINE_STYLES,
     LINE_WIDTH,
     Style,
     add_table,
@@ -45,7 +46,6 @@ _HEADS = (
 )
 _GUIDE_DECADES = 3  # decades of the guide functions, below and above their value halfway out
 _PASS_DECADES = 6
-_GREY = "#666666"
 _DISTANCE = "distance from the middle (mm)"
 _NOTE = (
     "Difference: a aᵀ less the 2D kernel, as a share of the channel's energy; red where the fit "
@@ -154,11 +154,12 @@ def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
     pitch = guide.mm_per_pixel
     edges = pitch * (np.arange(guide.preintegrated.size + 1) - 0.5)
     edges[0] = 0.2 * pitch
-    dashed: Style = {"color": _GREY, "ls": (0, (4, 1.6)), "lw": LINE_WIDTH}
+    theirs, ours = METHODS["preintegrated"], METHODS["guided"]
+    dashed: Style = {"color": theirs.colour, "ls": LINE_STYLES[1], "lw": LINE_WIDTH}
     values = guide.preintegrated / pitch
-    draw_steps(axes, values, edges, snap=False, label="pre-integrated", **dashed)
+    draw_steps(axes, values, edges, snap=False, label=theirs.name, **dashed)
     if guided is not None:
-        style: Style = {"color": COLOURS[2], "lw": 1.4, "label": "guided"}
+        style: Style = {"color": ours.colour, "lw": 1.4, "label": ours.name}
         draw_steps(axes, guided / pitch, edges, snap=False, **style)
     axes.set_xscale("log")
     axes.set_yscale("log", nonpositive="clip")

@@ -24,6 +24,7 @@ from matplotlib.ticker import (
 )
 
 from sssfit.arrays import FloatArray
+from sssfit.chart.looks import MODELS
 from sssfit.chart.page import (
     Handle,
     Style,
@@ -55,15 +56,9 @@ _LINEAR_PERCENT, _LEAST_PERCENT, _MOST_PERCENT = 10.0, -100.0, 1000.0
 _TICKS_PERCENT = (-100, -10, 0, 10, 100, 1000)
 _MINUS = "\N{MINUS SIGN}"
 
-# Black, and of Okabe and Ito 2008: sky blue, vermillion, blue, bluish green; dashes distinguish
-# them without colour.
+_WIDTHS = {"exact": 1.3, "montecarlo": 0.8, "burley": 1.5}  # points; of the others 1.2
 _STYLES: dict[str, Style] = {
-    "exact": {"color": "#000000", "linestyle": "-", "lw": 1.3},
-    "montecarlo": {"color": "#56b4e9", "linestyle": "-", "lw": 0.8},
-    "dipole": {"color": "#d55e00", "linestyle": (0, (5, 1.5)), "lw": 1.2},
-    "dipole-grosjean": {"color": "#0072b2", "linestyle": (0, (6, 1.4, 1.2, 1.4)), "lw": 1.2},
-    "burley": {"color": "#009e73", "linestyle": (0, (1.3, 1.2)), "lw": 1.5},
-    "multipole": {"color": "#d55e00", "linestyle": (0, (5, 1.5)), "lw": 1.2},
+    name: each.stroke(_WIDTHS.get(name, 1.2)) for name, each in MODELS.items()
 }
 _BAND_ALPHA = 0.45
 

@@ -15,9 +15,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from sssfit.arrays import FloatArray
+from sssfit.chart.looks import RENDERERS, spare
 from sssfit.chart.page import (
-    COLOURS,
-    LINE_STYLES,
+    LINE_WIDTH,
     Style,
     add_legend,
     name_axes,
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from sssfit.motion.record import MovingLight, Track
 
 _HEIGHT_INCHES, _LINES_INCHES, _MAPS_INCHES = 9.9, 4.0, 4.7
-# Okabe and Ito's vermillion, green and blue for what adapts, then their orange, purple and black.
-_COLOURS = (*COLOURS, "#e69f00", "#cc79a7", "#000000")
-_STYLES = (*LINE_STYLES[:3], *LINE_STYLES[:3])
 _ERROR_DECADES, _DECADES = 6.0, 4.0  # most of an error and of a variance that are drawn
 _SAMPLE_TICKS = (1, 2, 4, 8, 16, 32, 64)
 _LEAST, _MOST = _SAMPLE_TICKS[0], _SAMPLE_TICKS[-1]
@@ -62,7 +59,7 @@ def moving_light_figure(moving: MovingLight) -> Figure:
     title = f"{moving.material}, {moving.scene}: {moving.light} light"
     height = _HEIGHT_INCHES
     with new_page(height, title, _subtitle(moving), [_NOTE.format(moving.cold)]) as (figure, below):
-        styles = {each.name: _style(k) for k, each in enumerate(moving.tracks)}
+        styles = {each.name: _style(each.name, k) for k, each in enumerate(moving.tracks)}
         handles = [Line2D([], [], **styles[each.name]) for each in moving.tracks]
         below = add_legend(below, handles, [_label(moving, each) for each in moving.tracks])
         ratios = (_LINES_INCHES, _MAPS_INCHES)
@@ -89,8 +86,9 @@ def _label(moving: MovingLight, track: Track) -> str:
     return f"{track.label}: {track.mean_fetches:.3g} fetches{error}"
 
 
-def _style(k: int) -> Style:
-    return {"color": _COLOURS[k % len(_COLOURS)], "linestyle": _STYLES[k % len(_STYLES)]}
+def _style(name: str, k: int) -> Style:
+    """Return a renderer's line; that of the k-th if it has no look of its own."""
+    return (RENDERERS.get(name) or spare(name, k)).stroke(LINE_WIDTH)
 
 
 def _draw_lines(place: SubFigure, moving: MovingLight, styles: dict[str, Style]) -> None:

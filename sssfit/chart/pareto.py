@@ -21,8 +21,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocat
 from matplotlib.transforms import Bbox
 
 from sssfit.arrays import FloatArray
+from sssfit.chart.looks import DASHED, METHODS, RULE, look
 from sssfit.chart.page import (
-    COLOURS,
     RC,
     Style,
     add_legend,
@@ -41,26 +41,6 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 _HEAD_INCHES, _PANEL_INCHES = 1.9, 2.3  # heights of title, legend and notes; of a panel
-# Those of `COLOURS` and more of Okabe and Ito's and of Tol's, safe for colour blindness.
-_METHODS: dict[str, tuple[str, str, str]] = {
-    "cascade": ("cascade", "#000000", "*"),
-    "svd": ("SVD", COLOURS[2], "o"),
-    "gaussians": ("sum of Gaussians", COLOURS[0], "s"),
-    "preintegrated": ("pre-integrated", COLOURS[1], "^"),
-    "guided": ("guided", "#cc79a7", "D"),
-    "artist": ("artist", "#e69f00", "v"),
-    "falloff": ("falloff", "#56b4e9", "P"),
-    "burley": ("Burley", "#999999", "X"),
-    "weighted": ("weighted terms", "#882255", "<"),
-    "gaussian-chain": ("chain of Gaussians", "#661100", "d"),
-    "pyramid": ("convolution pyramid", "#44aa99", "h"),
-    "rotated": ("passes in 3 or 4 directions", "#aa4499", "8"),
-    "disk": ("disk, one frame", "#999933", "p"),
-}
-# Of the other methods of `FITS`, each in turn; these are Tol's, too.
-_SPARE_COLOURS = ("#332288", "#117733", "#ddcc77")
-_SPARE_MARKERS = (">", "H", (4, 1, 0), (6, 1, 0))
-_GREY = "#666666"
 _FAINT = 0.35
 _MOST_TICKS = 8
 _LANE = 0.014  # share of the panel's width between points of equal cost
@@ -69,7 +49,7 @@ _BESIDE, _LINE, _STEP = 5.5, 4.5, 2.0
 _FARTHEST = 16  # most places down or up
 _MARKER, _CLEAR_PIXELS = 0.045, 4.0  # half a marker in inches, and what labels keep clear of
 _JUST_NOTICEABLE = 1.0  # Delta E
-_NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
+_NOTICED: Style = {"color": RULE, "lw": 0.8, "ls": DASHED}
 _WORTH_A_NOTE = 1e-3  # share of the light
 _LEAST = {"delta-e": 1e-3, "p99": 1e-3, "l2": 1e-5}  # smaller errors are drawn at this value
 _ERRORS = {
@@ -136,10 +116,10 @@ def _handles(comparison: Comparison, error: str) -> list[Line2D]:
     """Draw the legend of the methods and lines."""
     handles = [
         *_method_handles(comparison),
-        Line2D([], [], color=_GREY, lw=1.0, label="Pareto front"),
+        Line2D([], [], color=RULE, lw=1.0, label="Pareto front"),
     ]
     if error != "l2":
-        handles.append(Line2D([], [], label="ΔE 1, just noticeable", **_NOTICED))
+        handles.append(Line2D([], [], label="ΔE 2000 of 1, just noticeable", **_NOTICED))
     return handles
 
 
@@ -152,7 +132,7 @@ def _method_handles(comparison: Comparison) -> list[Line2D]:
     kept = {row.method: row for row in reversed(comparison.rows) if _is_kept(row)}
     handles = []
     for method in sorted(drawn, key=lambda each: _kind(drawn[each])[0]):
-        name = _look(method)[0]
+        name = look(method).name
         handles.append(Line2D([], [], label=name, **_style(drawn[method], is_kept=False)))
         if method in kept:
             style = _style(kept[method], is_kept=True)
@@ -178,7 +158,7 @@ def _draw_panel(
     if not points:
         return
     x_front, y_front = (list(each) for each in zip(*points, strict=True))
-    style: Style = {"where": "post", "color": _GREY, "lw": 1.0, "zorder": 2}
+    style: Style = {"where": "post", "color": RULE, "lw": 1.0, "zorder": 2}
     axes.step([*x_front, high], [*y_front, y_front[-1]], **style)
 
 
@@ -345,23 +325,8 @@ def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> 
 
 def _kind(row: KernelRow) -> tuple[int, bool]:
     """Return the position of a row's method in the legend."""
-    known = [*_METHODS, *_others()]
+    known = [*METHODS, *(each for each in FITS if each not in METHODS)]
     return known.index(row.method) if row.method in known else len(known), _is_kept(row)
-
-
-def _others() -> list[str]:
-    """Return the methods that have no colour and marker of their own."""
-    return [method for method in FITS if method not in _METHODS]
-
-
-def _look(method: str) -> tuple[str, str, str | tuple[int, int, int]]:
-    """Return a method's name in the legend, its colour and its marker, spare ones if need be."""
-    if method in _METHODS:
-        return _METHODS[method]
-    others = _others()
-    k = others.index(method) if method in others else len(others)
-    colour = _SPARE_COLOURS[k % len(_SPARE_COLOURS)]
-    return method, colour, _SPARE_MARKERS[k % len(_SPARE_MARKERS)]
 
 
 def _is_kept(row: KernelRow) -> bool:
@@ -371,15 +336,15 @@ def _is_kept(row: KernelRow) -> bool:
 
 def _style(row: KernelRow, *, is_kept: bool) -> Style:
     """Return colour and marker of a row's method: small if dense, hollow if with a fit's energy."""
-    _, colour, marker = _look(row.method)
+    own = look(row.method)
     return {
-        "color": colour,
-        "marker": marker,
+        "color": own.colour,
+        "marker": own.marker,
         "ms": 4 if row.is_dense else 7 if row.structure else 5.5,
         "mew": 0.9,
         "ls": "none",
         "zorder": 3,
-        "markerfacecolor": "white" if is_kept else colour,
+        "markerfacecolor": "white" if is_kept else own.colour,
     }
 
 

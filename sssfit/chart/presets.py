@@ -15,13 +15,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.page import SHADES, Style, add_legend, label_minor, name_axes, new_page
+from sssfit.chart.looks import RULE, series
+from sssfit.chart.page import Style, add_legend, label_minor, name_axes, new_page
 
 if TYPE_CHECKING:
     from sssfit.compare.presets import PresetComparison
 
 _HEIGHT_INCHES, _LINE_INCHES, _GAP_INCHES = 1.8, 0.075, 0.09  # of a row: per picture, and between
-_MARKERS = "os^Dv<>P*X"
 _LEAST = 1e-2  # what is smaller has a place of its own: a logarithmic axis has none for 0
 _NOTE = (
     "ΔE 2000, 95th percentile over the pixels of each picture, of the engine's own diffusion model "
@@ -50,7 +50,7 @@ def presets_figure(found: PresetComparison) -> Figure:
     height = _HEIGHT_INCHES + row_inches * len(names)
     where = f"{found.material}, pixels of {found.mm_per_pixel:g} mm"
     with new_page(height, "What engines show of a material", where, [_NOTE]) as (figure, below):
-        styles = [_style(k) for k in range(count)]
+        styles: list[Style] = [{**series(k), "ls": ""} for k in range(count)]
         below = add_legend(below, [Line2D([], [], **each) for each in styles], found.pictures)
         axes = below.subplots()
         least = _scale(axes, errors)
@@ -60,23 +60,13 @@ def presets_figure(found: PresetComparison) -> Figure:
         for k, style in enumerate(styles):
             seen = np.where(errors[:, k] < _LEAST, least, errors[:, k])
             axes.plot(seen, places + shifts[k], **style)
-        axes.axvline(1.0, color="#666666", lw=0.6)
+        axes.axvline(1.0, color=RULE, lw=0.6)
         if (errors < _LEAST).any():
             _break(axes, least * 10.0**0.25)
         name_axes(axes, "", "ΔE 2000, 95th percentile", "")
         axes.set_yticks(places, names)
         axes.set_ylim(len(names) - 0.5, -0.5)
     return figure
-
-
-def _style(picture: int) -> Style:
-    """Return colour and marker of a picture, distinguishable without colour too."""
-    return {
-        "color": SHADES[picture % len(SHADES)],
-        "marker": _MARKERS[picture % len(_MARKERS)],
-        "markersize": 4.2,
-        "ls": "",
-    }
 
 
 def _scale(axes: Axes, errors: FloatArray) -> float:

@@ -16,21 +16,22 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.page import COLOURS, Style, add_legend, name_axes, new_page, tick_decades
+from sssfit.chart.looks import RULE, series
+from sssfit.chart.page import Style, add_legend, name_axes, new_page, tick_decades
 from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.crowd.table import SpeedUpTable
 
 _HEIGHT_INCHES = 7.6
-_COLOURS = (*COLOURS, "#e69f00", "#000000")
-_MARKERS = "os^Dv"
 _SHORT_DECADES, _LEAST_DECADES = 2.0, 0.5  # of the y axis
 _SOME, _MANY = (1.0, 2.0, 5.0), (1.0, 2.0, 3.0, 4.0, 6.0)  # numbers of a decade
+_DOTTED: Style = {"lw": 0.9, "linestyle": ":"}
 _NOTE = (
-    "Speed-up: without savings over with all three. Dotted: Jimenez and Gutierrez 2008, Table 1, "
-    "frames a second on a GeForce 8800 GTX. Texture over screen: texels that texture space with "
-    "savings convolves over pixels that screen space does; below 1 texture space is cheaper."
+    "Speed-up: without savings over with all three. Published: Jimenez and Gutierrez 2008, Table "
+    "1, frames a second on a GeForce 8800 GTX, in the colours of the heads. Texture over screen: "
+    "texels that texture space with savings convolves over pixels that screen space does; below 1 "
+    "texture space is cheaper."
 )
 
 
@@ -55,23 +56,25 @@ def speed_up_figure(table: SpeedUpTable) -> Figure:
     title = "What texture space need not compute"
     with new_page(_HEIGHT_INCHES, title, where, [_NOTE]) as (figure, below):
         handles = [Line2D([], [], **_style(k)) for k in range(len(table.heads))]
-        below = add_legend(below, handles, [counted(each, "head") for each in table.heads])
+        handles.append(Line2D([], [], color=RULE, **_DOTTED))
+        heads = [counted(each, "head") for each in table.heads]
+        below = add_legend(below, handles, [*heads, "published (2008)"])
         grid = below.subplots(2, 2).ravel()
-        _draw(grid[0], table, table.texels, "speed-up in convolved texels", "times fewer")
-        _draw(grid[1], table, table.seconds, "speed-up in time", "times as fast")
+        _draw(grid[0], table, table.texels, "(a) speed-up in convolved texels", "times fewer")
+        _draw(grid[1], table, table.seconds, "(b) speed-up in time", "times as fast")
         for axes in grid[:2]:
             _draw_published(axes, table)
-        _draw(grid[2], table, table.over_screen, "texture over screen space", "texels / pixels")
-        grid[2].axhline(1.0, color="#666666", lw=0.6)
+        _draw(grid[2], table, table.over_screen, "(c) texture over screen space", "texels / pixels")
+        grid[2].axhline(1.0, color=RULE, lw=0.6)
         errors = np.array([[f.work["saved"].mean_delta_e for f in row] for row in table.frames])
-        _draw(grid[3], table, np.maximum(errors, 1e-4), "error of the savings", "mean Delta E 2000")
+        _draw(grid[3], table, np.maximum(errors, 1e-4), "(d) error of the savings", "mean ΔE 2000")
         for axes in grid:
             _tick(axes.yaxis)
     return figure
 
 
 def _style(k: int) -> Style:
-    return {"color": _COLOURS[k], "marker": _MARKERS[k], "markersize": 3.5, "lw": 1.0}
+    return {**series(k, 3.5), "lw": 1.0}
 
 
 def _draw(axes: Axes, table: SpeedUpTable, values: FloatArray, title: str, y_label: str) -> None:
@@ -104,4 +107,4 @@ def _tick(axis: Axis) -> None:
 def _draw_published(axes: Axes, table: SpeedUpTable) -> None:
     """Draw the paper's speed-ups, dotted."""
     for k, line in enumerate(table.published):
-        axes.plot(table.distances, line, color=_COLOURS[k], lw=0.9, linestyle=":")
+        axes.plot(table.distances, line, color=series(k)["color"], **_DOTTED)

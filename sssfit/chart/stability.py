@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
+from sssfit.chart.looks import RULE, variants
 from sssfit.chart.page import (
-    COLOURS,
-    LINE_STYLES,
     WIDTH_INCHES,
     Style,
     add_legend,
@@ -29,6 +28,7 @@ from sssfit.chart.page import (
     tick,
     tick_decades,
 )
+from sssfit.chart.text import symbols
 
 if TYPE_CHECKING:
     from sssfit.stability import Curve, Panel, Stability
@@ -36,12 +36,11 @@ if TYPE_CHECKING:
 _COLUMNS, _PANEL_INCHES, _HEAD_INCHES = 2, 2.15, 1.35
 # Of all stresses, 38 panels: five a row on a page of a large screen, where two made one of 42 in.
 _MANY, _WIDE_COLUMNS, _WIDE_PANEL_INCHES, _WIDE_INCHES = 12, 5, 2.0, 16.0
-# Okabe and Ito's vermillion, green and blue, then their orange, sky blue, purple and black.
-_COLOURS = (*COLOURS, "#e69f00", "#56b4e9", "#cc79a7", "#000000", "#999999")
-_MARKERS = "os^Dv<>P"
-_SAFE, _SMALL = "#e8f3ec", 6.5
+_SAFE, _SMALL, _POINTS = "#e8f3ec", 6.5, 3.4
 _HEADROOM = 0.25  # of the axis above the limit, at least
+_BELOW = 0.05  # of the axis below 0, so that points at 0 are whole
 _CROWDED = 3  # curves; above more stands their legend. Of as many labels it is the largest
+_PLAIN = 1e-3, 1e5  # between these a number is written without a power of ten
 _SHORT_DECADES = 1.3  # as `tick_decades` has it
 _LEGEND_LINE = 0.135  # of the axis of a crowded panel
 
@@ -62,6 +61,7 @@ def stability_figure(stability: Stability) -> Figure:
     """
     panels = stability.panels
     shared = _shared(stability)
+    styles = _styles(panels)
     is_wide = len(panels) > _MANY
     columns = _WIDE_COLUMNS if is_wide else _COLUMNS
     rows = math.ceil(len(panels) / columns)
@@ -72,11 +72,11 @@ def stability_figure(stability: Stability) -> Figure:
     title = f"{stability.material}: where fits are safe"
     with new_page(height, title, where, notes, width_inches=width) as (figure, below):
         if shared:
-            handles = [Line2D([], [], **_style(k)) for k in range(len(shared))]
+            handles = [Line2D([], [], **styles[each]) for each in shared]
             below = add_legend(below, handles, shared)
         grid = below.subplots(rows, columns, squeeze=False).ravel()
         for axes, panel in zip(grid, panels, strict=False):
-            _draw(axes, panel, shared)
+            _draw(axes, panel, styles, shared)
         for axes in grid[len(panels) :]:
             axes.remove()
     return figure
@@ -109,27 +109,19 @@ def _shared(stability: Stability) -> list[str]:
     return [label for label in every if stresses[label] > 1 or label in crowds]
 
 
-def _style(k: int) -> Style:
-    """Return the k-th style; from the ninth on, colours return with other markers, hollow."""
-    turn, place = divmod(k, len(_COLOURS))
-    return {
-        "color": _COLOURS[place],
-        "linestyle": LINE_STYLES[k // 2 % len(LINE_STYLES)],
-        "marker": _MARKERS[(place + turn) % len(_MARKERS)],
-        "markerfacecolor": "white" if turn % 2 else _COLOURS[place],
-        "markersize": 3.2,
-        "lw": 1.0,
-    }
+def _styles(panels: Sequence[Panel]) -> dict[str, Style]:
+    """Return a style for every label: its method's colour, and a marker of its own."""
+    labels = [each.label for panel in panels for each in panel.curves]
+    return {label: style | {"lw": 1.0} for label, style in variants(labels, _POINTS).items()}
 
 
-def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
-    styles = _styles([each.label for each in panel.curves], shared)
+def _draw(axes: Axes, panel: Panel, styles: Mapping[str, Style], shared: Sequence[str]) -> None:
     own = []
     for each in panel.curves:
-        line = _line(axes, each, _style(styles[each.label]))
+        line = _line(axes, each, styles[each.label])
         own += [line] if each.label not in shared else []
-    name_axes(axes, panel.title, panel.axis.label, panel.y_label)
-    axes.yaxis.label.set_fontsize(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
+    name_axes(axes, panel.title, panel.axis.label, symbols(panel.y_label))
+    axes.yaxis.label.set_fontsize(_SMALL)  # "change of p99 of ΔE 2000" is as long as a panel
     if panel.axis.is_log:
         axes.set_xscale("log")
         _tick_decades(axes.xaxis, 8)
@@ -146,9 +138,9 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
         axes.set_ylim(low, high)
         tick(axes.yaxis)
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
-    axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
+    axes.axhline(panel.limit, color=RULE, lw=0.6, zorder=1)
     if _reaches_floor(panel):
-        axes.axhline(panel.floor, color="#666666", lw=0.8, ls=":", zorder=1)
+        axes.axhline(panel.floor, color=RULE, lw=0.8, ls=":", zorder=1)
     if own:
         place: Style = {"loc": "upper right" if is_crowded else "best"}
         legend = axes.legend(handles=own, fontsize=_SMALL, frameon=True, framealpha=0.85, **place)
@@ -160,13 +152,17 @@ def _tick_decades(axis: Axis, most: int) -> None:
     tick_decades(axis, most)
     low, high = axis.get_view_interval()
     if math.log10(high / low) < _SHORT_DECADES:
-        axis.set_major_formatter("{x:g}")
+        axis.set_major_formatter(lambda value, _: _short(value))
+        axis.set_minor_formatter(lambda value, _: _short(value))
 
 
-def _styles(labels: list[str], shared: list[str]) -> dict[str, int]:
-    """Return the number of each curve's style: that of the figure's legend, or one after them."""
-    free = itertools.count(len(shared))
-    return {each: shared.index(each) if each in shared else next(free) for each in labels}
+def _short(value: float) -> str:
+    """Return a tick's label: 0.01, but 2·10⁻⁶ in place of 2e-06."""
+    if value == 0.0 or _PLAIN[0] <= abs(value) < _PLAIN[1]:
+        return f"{value:g}"
+    power = math.floor(math.log10(abs(value)) + 1e-9)
+    digits = f"{value / 10.0**power:g}"
+    return rf"$10^{{{power}}}$" if digits == "1" else rf"${digits}\cdot 10^{{{power}}}$"
 
 
 def _line(axes: Axes, curve: Curve, style: Style) -> Line2D:
@@ -196,7 +192,8 @@ def _range(panel: Panel) -> tuple[float, float]:
     values = np.concatenate([*(each.y for each in panel.curves), *ends])
     values = np.append(values[np.isfinite(values)], panel.limit)
     if not panel.is_log:
-        return 0.0, float(values.max()) * (1.0 + _HEADROOM) or 1.0
+        high = float(values.max()) * (1.0 + _HEADROOM) or 1.0
+        return -_BELOW * high * (float(values.min()) <= 0.0), high
     positive = values[values > 0.0]
     low, high = float(positive.min()), float(positive.max())
     return 0.7 * low, max(high, panel.limit * 3.0) * 1.5

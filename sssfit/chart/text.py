@@ -74,6 +74,11 @@ def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
     return " · ".join(parts)
 
 
+def symbols(words: str) -> str:
+    """Return the words of a record as charts write them; records have them in plain letters."""
+    return words.replace("Delta E", "ΔE")
+
+
 def method_name(method: object) -> str:
     """Return the displayed name of a method."""
     return _METHODS.get(str(method), shortened(str(method)))

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
+from sssfit.chart.looks import BLACK, ORANGE, PURPLE
 from sssfit.chart.page import COLOURS, LINE_STYLES, Style, add_table, name_axes, new_page, tick
 from sssfit.messages import counted
 
@@ -21,21 +22,26 @@ if TYPE_CHECKING:
     from sssfit.motion.table import VariateTable
 
 _HEIGHT_INCHES = 8.2
-_LABELS = (
-    "Res_f: no control variate",
-    "Res_SF: coefficient of a frame",
-    "Res_SF_EMA: its moving mean",
-    "Res_EMCM: moving covariance",
-    "Res_hat_EMCM: the same, G constant in a frame",
-    "Res_GT: true coefficient",
-)
-_COLOURS = (*COLOURS, "#e69f00", "#000000", "#cc79a7")
+# Of the columns of the paper's table, by their names in it.
+_LABELS = {
+    "Res_f": "no control variate",
+    "Res_SF": "coefficient of a single frame",
+    "Res_SF_EMA": "its moving mean",
+    "Res_EMCM": "moving covariance",
+    "Res_hat_EMCM": "moving covariance, G of the frame",
+    "Res_GT": "true coefficient",
+}
+_COLOURS = (*COLOURS, ORANGE, BLACK, PURPLE)
 _ORDER = (0, 5, 1, 2, 3, 4)  # what is drawn first lies behind
-_HEADS = ("", "still", "published", "moving", "published")
+_HEADS = ("", "name", "still light", "published", "moving light", "published")
+_LETTERS = "ace", "bdf"  # of the panels of a column
+_PANELS = ("coefficient of g", "residual", "deviation of the residual")
 _NOTE = (
-    "Lines: one run, the first seed. Table: medians over the seeds of the root of the residual's "
-    "moving variance, frames 25 to 100, beside the published values. Still: h = 1; moving: "
-    "h = 1 + 3 sin(t / 10). The coefficient of the fifth is that of the fourth."
+    "Lines: one run, the first seed. Residual: f less the coefficient times g, mean of a frame's "
+    "samples; G is the known integral of g. Table: medians over the seeds of the residual's "
+    "deviation, frames 25 to 100, beside those of Xie and Olano (2021, supplement, Table 1). "
+    "Still: h = 1; moving: h = 1 + 3 sin(t / 10). Both lines of moving covariance have "
+    "the same coefficient."
 )
 
 
@@ -61,14 +67,15 @@ def variates_figure(table: VariateTable) -> Figure:
             parts = (trace.coefficient, trace.residual, trace.error)
             for axes, values in zip(grid[:, column], parts, strict=True):
                 _draw(axes, values)
-            name_axes(grid[0, column], f"{light} light", "", "coefficient" * (column == 0))
-            name_axes(grid[1, column], "", "", "residual" * (column == 0))
-            name_axes(grid[2, column], "", "frame", "root of moving variance" * (column == 0))
+            for axes, name, letter in zip(grid[:, column], _PANELS, _LETTERS[column], strict=True):
+                name_axes(axes, f"({letter}) {light} light", "", name)
+            grid[2, column].set_xlabel("frame")
             coefficients = trace.coefficient[:, 9:]
             low, high = float(coefficients.min()), float(coefficients.max())
             room = 0.1 * (high - low)
             grid[0, column].set_ylim(low - room, high + room)
-        below.align_ylabels(grid[:, 0])
+        for column in range(2):
+            below.align_ylabels(grid[:, column])
     return figure
 
 
@@ -77,18 +84,21 @@ def _seeds(table: VariateTable) -> str:
 
 
 def _rows(table: VariateTable) -> list[tuple[str, list[str]]]:
-    """Return name and figures of each residual."""
+    """Return what each residual is, its name in the paper, and its figures."""
     told = table.to_dict()
     return [
         (
             label,
             [
-                f"{told[of][light][label.partition(':')[0]]:.4f}"
-                for light in ("still", "moving")
-                for of in ("table", "published")
+                name,
+                *(
+                    f"{told[of][light][name]:.4f}"
+                    for light in ("still", "moving")
+                    for of in ("table", "published")
+                ),
             ],
         )
-        for label in _LABELS
+        for name, label in _LABELS.items()
     ]
 
 
