@@ -1,13 +1,17 @@
 """The chart of stresses: its data fill the panels, a style means one method, and all is legible."""
 
 import itertools
+import json
 
 import numpy as np
 import pytest
+from approval_figures import figure_lines
 from figures import assert_legible, legends_of, words_of
 from matplotlib.colors import to_hex
 
+from sssfit.chart.looks import METHODS
 from sssfit.chart.stability import stability_figure
+from sssfit.errors import FileError
 from sssfit.methods import STRESSES
 from sssfit.stability import Curve, Panel, Stability
 from sssfit.stability.curve import Axis
@@ -109,6 +113,46 @@ def test_a_floor_is_drawn_where_points_lie_on_it():
         dotted = [each for each in figure.axes[0].lines if each.get_linestyle() == ":"]
         assert [list(each.get_ydata()) for each in dotted] == [[0.1, 0.1]] * (title == "on it")
         assert ("Dotted: the least that a panel shows" in words_of(figure)) is (title == "on it")
+
+
+def test_panels_of_zeros_show_their_points_whole():
+    """A count that is 0 everywhere lies on the axis; the limit of it may be 0 too."""
+    zeros = [Curve("guided", X, np.zeros(4))]
+    found = panel("guided", [], curves=zeros, limit=0.0, is_log=False)
+    (axes,) = stability_figure(record(found)).axes
+    assert axes.get_ylim() == pytest.approx((-0.05, 1.0))
+
+
+def test_methods_look_as_in_all_charts():
+    labels = ["svd 1", "svd 3, smoothed", "cascade 24", "pre-integrated, 25 taps", "burley"]
+    (axes,) = stability_figure(record(panel("noise", labels))).axes
+    drawn = {each.get_label(): each for each in axes.lines if each.get_marker() != "None"}
+    methods = ("svd", "svd", "cascade", "preintegrated", "burley")
+    for label, method in zip(labels, methods, strict=True):
+        assert to_hex(drawn[label].get_color()) == METHODS[method].colour
+    assert drawn["cascade 24"].get_marker() == METHODS["cascade"].marker
+    assert look(drawn["svd 1"]) != look(drawn["svd 3, smoothed"])
+
+
+def test_delta_e_is_written_as_in_all_charts():
+    words = words_of(stability_figure(record(panel("noise", ["svd"]))))
+    assert "p99 of ΔE 2000" in words
+    assert "Delta E" not in words
+
+
+def test_a_record_is_drawn_again_from_its_figures():
+    """From what `sssfit stability --json` prints: infinite measures and bars come back."""
+    refused = curve("svd", low=np.full(4, 0.01), high=np.array([3.0, np.inf, 1.0, 1.0]))
+    ways = panel("noise", ["guided"]), panel("grid", [], curves=[refused], floor=0.1, is_log=False)
+    found = Stability("skin1", 0.3, ways, ("Left out imports.",), 7)
+    again = Stability.from_dict(json.loads(json.dumps(found.to_dict(), allow_nan=False)))
+    assert again.to_dict() == found.to_dict()
+    assert again.table() == found.table()
+    assert figure_lines(stability_figure(again), {}) == figure_lines(stability_figure(found), {})
+    told = found.to_dict()
+    del told["panels"][0]["limit"]
+    with pytest.raises(FileError, match="no 'limit'"):
+        Stability.from_dict(told)
 
 
 def test_more_methods_than_colours_have_styles_of_their_own():

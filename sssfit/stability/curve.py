@@ -1,5 +1,6 @@
 """Curves of a measure over what a stress makes harder."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,6 +59,27 @@ class Curve(ReadOnly):
                 stored = np.array(value, dtype=np.float64)
                 stored.setflags(write=False)
                 object.__setattr__(self, name, stored)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what there is, by the names of the parameters."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+    @classmethod
+    def from_dict(cls, told: Mapping[str, Any]) -> "Curve":
+        """Return the curve whose `to_dict` this is; None, as JSON has it, is infinite."""
+        low, high = (told[name] for name in ("low", "high"))
+        return cls(
+            label=told["label"],
+            x=_figures(told["x"]),
+            y=_figures(told["y"]),
+            low=None if low is None else _figures(low),
+            high=None if high is None else _figures(high),
+            advice=told["advice"],
+        )
+
+
+def _figures(told: Sequence[float | None]) -> FloatArray:
+    return np.array([np.inf if each is None else each for each in told], dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Panels: curves with a limit, and where each of them stays safe."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,20 +109,32 @@ class Panel:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures for JSON; None where a fit was refused."""
+        axis = {"mild": self.axis.mild, "x_is_log": self.axis.is_log, "x_form": self.axis.form}
         return plain(
             {
                 "stress": self.stress,
                 "title": self.title,
                 "x": self.axis.label,
+                **axis,
                 "y": self.y_label,
+                "y_is_log": self.is_log,
+                "floor": self.floor,
                 "limit": self.limit,
                 "fails": self.fails,
-                "curves": [
-                    {"label": c.label, "x": c.x, "y": c.y, "low": c.low, "high": c.high}
-                    for c in self.curves
-                ],
+                "curves": [each.to_dict() for each in self.curves],
                 "findings": [each.to_dict() for each in self.findings()],
             }
+        )
+
+    @classmethod
+    def from_dict(cls, told: Mapping[str, Any]) -> "Panel":
+        """Return the panel whose `to_dict` this is."""
+        return cls(
+            **{key: told[key] for key in ("stress", "title", "limit", "fails", "floor")},
+            y_label=told["y"],
+            is_log=told["y_is_log"],
+            axis=Axis(told["x"], told["mild"], is_log=told["x_is_log"], form=told["x_form"]),
+            curves=[Curve.from_dict(each) for each in told["curves"]],
         )
 
 

@@ -1,8 +1,10 @@
 """What all stresses of one material find, as a table, a text and a dictionary."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from sssfit.errors import FileError
 from sssfit.messages import table
 from sssfit.stability.panel import Panel
 
@@ -36,6 +38,26 @@ class Stability:
             "panels": [each.to_dict() for each in self.panels],
             "notes": list(self.notes),
         }
+
+    @classmethod
+    def from_dict(cls, told: Mapping[str, Any]) -> "Stability":
+        """Return the record whose `to_dict` this is, to be drawn or tabulated again.
+
+        Raises
+        ------
+        FileError
+            Something is missing, or is no figure.
+        """
+        try:
+            panels = tuple(Panel.from_dict(each) for each in told["panels"])
+            own = {key: told[key] for key in ("material", "mm_per_pixel", "seed")}
+            return cls(**own, panels=panels, notes=tuple(told["notes"]))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            reason = f"no {error}" if isinstance(error, KeyError) else str(error)
+            raise FileError(
+                f"no figures of stresses ({reason}); expected what a stability record's to_dict "
+                "gives, with all its keys."
+            ) from error
 
     def table(self) -> str:
         """Return the Markdown table: of which quantity each method is safe, and what to do."""
