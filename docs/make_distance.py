@@ -9,7 +9,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 from sections import DOCS, put_section
 
-from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
+from sssfit.chart.looks import DASHED, GREY, METHODS, RULE
+from sssfit.chart.page import NOTE_SIZE, add_legend, name_axes, new_page, save_figure
 from sssfit.fit import fit_pitches, fit_result, fit_taps
 from sssfit.kernel import taps_between
 from sssfit.measure.score import measure
@@ -43,11 +44,11 @@ them; two pictures cost the fetches of two tables:
 {between}
 """
 STYLES = {
-    "cascade, one table": {"color": "black", "marker": "*", "ms": 8, "lw": 1.4},
-    "cascade, a table an octave, mixed": {"color": "black", "marker": ".", "ms": 6, "lw": 1.2,
-                                          "ls": (0, (4, 2))},
-    "pair of passes": {"color": COLOURS[1], "marker": "^", "ms": 5, "lw": 1.2},
-    "disk, one frame": {"color": COLOURS[2], "marker": "o", "ms": 4, "lw": 1.2},
+    "cascade, one table": {**METHODS["cascade"].points(5.4), "lw": 1.4},
+    "cascade, a table an octave, mixed": {**METHODS["cascade"].points(5.0), "lw": 1.2,
+                                          "mfc": "white", "ls": DASHED},
+    "pair of passes": {**METHODS["preintegrated"].points(5.0), "lw": 1.2},
+    "disk, one frame": {**METHODS["disk"].points(5.0), "lw": 1.2},
 }  # fmt: skip
 
 
@@ -125,7 +126,7 @@ def chart(errors):
     """Draw error over the size of a pixel."""
     note = (
         "Mean over a disk, edges at 0, 15, 30 and 45 degrees, a head, points and highlights of the "
-        "99th percentile of Delta E 2000. One table each, made for pixels of 0.3 mm, its offsets "
+        "99th percentile of ΔE 2000. One table each, made for pixels of 0.3 mm, its offsets "
         "in mm: a cascade of 22.8 fetches, the pre-integrated pair of passes on 11 taps (22 "
         "fetches), a disk of 24. Dashed: cascades for .075, .15, .3, .6 and 1.2 mm, numbers mixed "
         "between them."
@@ -136,14 +137,14 @@ def chart(errors):
         axes = add_legend(below, handles, list(STYLES)).subplots()
         for name, style in STYLES.items():
             axes.plot(2.0**STEPS, [each[name] for each in errors], **style)
-        axes.axhline(1.0, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
+        axes.axhline(1.0, color=RULE, lw=0.8, ls=DASHED, zorder=1)
         axes.annotate(
             "just noticeable side by side",
             (0.25, 1.0),
             (0, 3),
             textcoords="offset points",
-            size=7.5,
-            color="#444444",
+            size=NOTE_SIZE,
+            color=GREY,
         )
         axes.set_xscale("log", base=2)
         axes.set_yscale("log")
@@ -155,7 +156,7 @@ def chart(errors):
             axes,
             "",
             "size of a pixel / size that the table is made for (0.3 mm)",
-            "99th percentile of ΔE 2000, mean",
+            "99th percentile of ΔE 2000,\nmean over eight pictures",
         )
     save_figure(figure, DOCS / "skin1-distance.png")
 

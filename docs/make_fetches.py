@@ -5,7 +5,6 @@ python docs/make_fetches.py
 
 import functools
 import itertools
-import math
 import warnings
 
 import numpy as np
@@ -16,7 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from sections import DOCS, put_section
 
-from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
+from sssfit.chart.looks import DASHED, GREY, RULE, look
+from sssfit.chart.page import NOTE_SIZE, add_legend, name_axes, new_page, save_figure
 from sssfit.compare.engines import engines
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_result
@@ -30,25 +30,22 @@ BUDGETS = (14, 17, 20, 24, 28, 36, 50, 75, 100)
 CASCADES = (7, 10, 11, 12, 14, 17, 20, 24, 28, 36)
 TAPS = (3, 5, 7, 9, 11, 13, 17, 21, 25, 33, 41, 49)
 MOST = 100  # fetches a pixel
-MARK_POINTS = 11.0  # between the middles of two marks of engines' samplers
-# Name, colour and marker in the chart; the method; the settings of its kernels, and their terms.
+MARK_POINTS = 12.0  # between the middles of two letters of engines' samplers
+LETTERS_AT = 75.0  # their height, in the chart's ΔE
+# Method, settings of its kernels, and their terms; by the names in the chart.
 PUBLISHED = {
-    "pre-integrated": (COLOURS[1], "^", "preintegrated", [({}, 1)]),
-    "artist": ("#e69f00", "v", "artist", [({}, 1), ({"target": "kernel"}, 1)]),
-    "falloff": ("#56b4e9", "P", "falloff", [({}, 1)]),
-    "guided": ("#cc79a7", "D", "guided", [({"k": k}, 1) for k in (0.0, 1.55, 4.0)]),
-    "SVD": (COLOURS[2], "o", "svd", [({"rank": n}, n) for n in (1, 2, 3, 4)]),
-    "sum of Gaussians": (COLOURS[0], "s", "gaussians", [({"terms": n}, n) for n in (2, 3, 4)]),
+    look(method).name: (method, kernels)
+    for method, kernels in {
+        "preintegrated": [({}, 1)],
+        "artist": [({}, 1), ({"target": "kernel"}, 1)],
+        "falloff": [({}, 1)],
+        "guided": [({"k": k}, 1) for k in (0.0, 1.55, 4.0)],
+        "svd": [({"rank": n}, n) for n in (1, 2, 3, 4)],
+        "gaussians": [({"terms": n}, n) for n in (2, 3, 4)],
+    }.items()
 }
-OURS = {
-    "weighted terms": ("#882255", "<", "weighted", [({"rank": n}, n) for n in (1, 2, 3)]),
-}
-# Marks of the relatives of cascades in the chart, by method.
-MARKS = {
-    "gaussian-chain": ("chain of Gaussians", {"color": "#661100", "marker": "d", "ls": "none"}),
-    "pyramid": ("convolution pyramid", {"color": "#44aa99", "marker": "h", "ls": "none"}),
-    "rotated": ("3 or 4 directions", {"color": "#aa4499", "marker": "8", "ls": "none"}),
-}
+OURS = {look("weighted").name: ("weighted", [({"rank": n}, n) for n in (1, 2, 3)])}
+NEAR = ("gaussian-chain", "pyramid", "rotated")  # relatives of cascades, points in the chart
 ROTATED = [("", "rotated", {"directions": n, "taps": taps}) for n, taps in ((3, 11), (4, 9))]
 PLACES = ("quadratic", "cumulative")
 
@@ -74,7 +71,7 @@ def seen(kernel, name):
 def on_taps_rows(name, groups, places):
     """Yield group, fetches, passes and error of every kernel at every number of taps."""
     profile = whole_profile(name)
-    for group, (_, _, method, kernels) in groups.items():
+    for group, (method, kernels) in groups.items():
         for settings, terms in kernels:
             dense = fit_result(profile, method, **settings).kernel
             for taps, place in itertools.product(TAPS, places):
@@ -129,7 +126,7 @@ def chart(rows, cascades, ours, shipped, relatives):
     """Draw error over fetches: a line a method, each the best within its fetches."""
     note = (
         "Mean over a disk, edges at 0, 15, 30 and 45 degrees, a head, points and highlights of the "
-        "99th percentile of Delta E 2000 against the exact profile's 2D kernel; 256 x 256 pixels "
+        "99th percentile of ΔE 2000 against the exact profile's 2D kernel; 256 x 256 pixels "
         "of 0.3 mm. A method's line is the best of its kernels on quadratic or cumulative taps "
         "within the fetches; terms share their first pass. Dotted: the error of the last "
         "cascade, at larger budgets."
@@ -137,8 +134,7 @@ def chart(rows, cascades, ours, shipped, relatives):
     letters = dict(zip("abcdefghijklmnopqrstuvwxyz", (each[0] for each in shipped), strict=False))
     key = ", ".join(f"{letter} {label}" for letter, label in letters.items())
     engines_note = (
-        f"Letters: samplers of engines as they ship, one frame: {key}. A letter that would cover "
-        "another is moved up."
+        f"Letters: samplers of engines as they ship, one frame, each tied to its place: {key}."
     )
     title = "skin1: what a budget of fetches shows"
     with new_page(5.6, title, "Exact profile, 0.3 mm a pixel", [note, engines_note]) as (
@@ -146,27 +142,31 @@ def chart(rows, cascades, ours, shipped, relatives):
         below,
     ):
         groups = {**PUBLISHED, **OURS}
-        styles = {"cascade": {"color": "black", "marker": "*", "ms": 8, "lw": 1.4}}
-        for group, (colour, marker, *_) in groups.items():
-            styles[group] = {"color": colour, "marker": marker, "ms": 4, "lw": 1.0}
-        styles["weighted terms"]["ls"] = (0, (4, 2))
-        for words, style in MARKS.values():
-            styles[words] = {**style, "ms": 5}
-        styles["engines"] = {"color": "#444444", "marker": "$a$", "ms": 5, "ls": "none"}
+        styles = {"cascade": {**look("cascade").line(5.4), "lw": 1.4}}
+        for group, (method, _) in groups.items():
+            styles[group] = {**look(method).line(), "lw": 1.0}
+        near = {method: {**look(method).points(5.0), "ls": "none"} for method in NEAR}
+        styles |= {look(method).name: style for method, style in near.items()}
+        styles["engines"] = {"color": GREY, "marker": ".", "ms": 5, "ls": "none"}
         handles = [Line2D([], [], **each) for each in styles.values()]
         axes = add_legend(below, handles, list(styles)).subplots()
         for group in groups:
             own = envelope([(f, e) for g, f, _, e in (*rows, *ours) if g == group])
             axes.plot(*zip(*own, strict=True), **styles[group])
         for method, fetches, error in relatives:
-            axes.plot([fetches], [error], **styles[MARKS[method][0]])
+            axes.plot([fetches], [error], **near[method])
         own = envelope([(f, e) for f, _, e, _ in cascades])
         axes.plot(*zip(*own, strict=True), **styles["cascade"])
-        axes.plot([own[-1][0], 110], [own[-1][1]] * 2, color="black", lw=0.8, ls=(0, (1, 2)))
-        marks = [mark(axes, *each) for each in zip(letters, shipped, strict=True)]
-        axes.axhline(1.0, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
+        axes.plot(
+            [own[-1][0], 110],
+            [own[-1][1]] * 2,
+            color=look("cascade").colour,
+            lw=0.8,
+            ls=(0, (1, 2)),
+        )
+        axes.axhline(1.0, color=RULE, lw=0.8, ls=DASHED, zorder=1)
         axes.annotate("just noticeable side by side", (105, 1.0), (0, 3), ha="right",
-                      textcoords="offset points", size=7.5, color="#444444")  # fmt: skip
+                      textcoords="offset points", size=NOTE_SIZE, color=GREY)  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlim(5.4, 240.0)
@@ -175,31 +175,41 @@ def chart(rows, cascades, ours, shipped, relatives):
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_minor_formatter(NullFormatter())
-        name_axes(axes, "", "texture fetches a pixel", "99th percentile of ΔE 2000, mean")
-    set_apart(marks)
+        axes.set_ylim(0.07, 130.0)
+        mean = "99th percentile of ΔE 2000,\nmean over eight pictures"
+        name_axes(axes, "", "texture fetches a pixel", mean)
+        tie(axes, letters, shipped)
     save_figure(figure, DOCS / "skin1-fetches.png")
 
 
-def mark(axes, letter, sampler):
-    """Draw the letter of an engine's sampler, tied to its place by a line."""
-    _, fetches, _, error = sampler
-    circle = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": "#666666", "lw": 0.6}
-    line = {"arrowstyle": "-", "color": "#666666", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
-    return axes.annotate(letter, (fetches, error), (0, 0), textcoords="offset points", size=7.5,
-                         weight="bold", ha="center", va="center", color="#222222", zorder=6,
-                         bbox=circle, arrowprops=line)  # fmt: skip
+def tie(axes, letters, shipped):
+    """Draw a dot for each engine's sampler, and its letter over all lines, tied to it."""
+    axes.figure.draw_without_rendering()  # places in points are known after the layout
+    order = sorted(zip(letters, shipped, strict=True), key=lambda each: (each[1][1], -each[1][3]))
+    places = axes.transData.transform([(f, e) for _, (_, f, _, e) in order])
+    circle = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": RULE, "lw": 0.6}
+    words = {"size": NOTE_SIZE, "weight": "bold", "ha": "center", "va": "center", "color": GREY}
+    line = {"arrowstyle": "-", "color": RULE, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
+    points = 72.0 / axes.figure.dpi
+    for (letter, (_, fetches, _, error)), x in zip(
+        order, apart(points * places[:, 0]), strict=True
+    ):
+        at = axes.transData.inverted().transform((x / points, 0.0))[0]
+        axes.plot([fetches], [error], marker=".", ms=5, color=GREY, ls="none", zorder=5)
+        axes.annotate(letter, (fetches, error), (at, LETTERS_AT), zorder=6,
+                      bbox=circle, arrowprops=line, **words)  # fmt: skip
 
 
-def set_apart(marks):
-    """Move marks that would cover others upwards, in the order of their errors."""
-    placed = []
-    for each in sorted(marks, key=lambda each: each.xy[1]):
-        x, y = each.axes.transData.transform(each.xy) * 72.0 / each.figure.dpi  # points
-        up = 0.0
-        while any(math.hypot(x - other[0], y + up - other[1]) < MARK_POINTS for other in placed):
-            up += 0.5
-        each.set_position((0.0, up))
-        placed.append((x, y + up))
+def apart(places):
+    """Return rising places in points, moved until they are `MARK_POINTS` from one another."""
+    moved = np.array(places, dtype=float)
+    for _ in range(1000):
+        short = MARK_POINTS - np.diff(moved)
+        if (short <= 1e-3).all():
+            break
+        k = int(short.argmax())
+        moved[k : k + 2] += np.array([-0.5, 0.5]) * short[k]
+    return moved
 
 
 def row(cells):
@@ -246,7 +256,7 @@ def short(rows, shipped, cascades, relatives):
     chains = [(f, e) for f, _, e, _ in cascades]
     published = [(f, e) for _, f, _, e in (*rows, *shipped)]
     two = min((e, g, f) for g, f, passes, e in rows if passes == 2)
-    near = {name: best([(f, e) for n, f, e in relatives if n == name], 22.0) for name in MARKS}
+    near = {name: best([(f, e) for n, f, e in relatives if n == name], 22.0) for name in NEAR}
     figures = {
         "eleven": best([*published, *chains], 11.0),
         "fourteen": best(chains, 14.0),

@@ -4,10 +4,17 @@ python docs/make_jitter.py
 """
 
 from make_cascades import row, whole_profile
-from make_samples import CROP, LIGHT_DEGREES, MM, PIXELS, bands, codes, lightness
+from make_samples import CROP, LIGHT_DEGREES, MM, PIXELS, bands, codes, lightness, name_rows
 from sections import DOCS, put_section
 
-from sssfit.chart.page import new_mosaic, new_page, put_difference, put_picture, save_figure
+from sssfit.chart.page import (
+    draw_bar,
+    new_mosaic,
+    new_page,
+    put_difference,
+    put_picture,
+    save_figure,
+)
 from sssfit.compare.frames import over_frames
 from sssfit.fit import fit_preintegrated, fit_taps
 from sssfit.fit.on_taps import on_taps
@@ -71,11 +78,12 @@ def main():
 def draw(drawn, exposure, truth):
     """Draw pictures over their errors."""
     note = (
-        "Pixels of .1 mm. Errors of lightness (CIE L*) are amplified "
-        f"{AMPLIFIED:g} times: red is too bright, blue too dark."
+        "The middle 16 mm of pictures of 32 mm, pixels of .1 mm. Below each picture its error of "
+        f"lightness, amplified {AMPLIFIED:g} times: red is too bright, blue too dark. Samples are "
+        "those of the pre-integrated pass, by importance."
     )
     title = "skin1: jittered samples and cascades on the nose"
-    with new_page(4.2, title, "Exact profile, light from the side", [note]) as (figure, below):
+    with new_page(4.3, title, "Exact profile, light from the side", [note]) as (figure, below):
         wide = 1.04
         axes = new_mosaic(below, wide * (len(drawn) + 1) - 0.04, 2.04)
         put_picture(axes, 0.0, 0.0, codes(exposure * truth))
@@ -84,6 +92,8 @@ def draw(drawn, exposure, truth):
             put_difference(axes, wide * k, 1.04, error[CROP], AMPLIFIED)
         names = ["true kernel", *(label for label, *_ in drawn)]
         axes.set_xticks([wide * k + 0.5 for k in range(len(names))], names)
+        name_rows(axes)
+        draw_bar(below, axes, AMPLIFIED, "CIE L* less that of the true kernel")
     save_figure(figure, DOCS / "skin1-jitter.png")
 
 

@@ -9,66 +9,86 @@ The cases are those of tests/checks_models.py whose totals are to agree within 5
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import checks_models  # noqa: E402
 
-from sssfit.chart.page import COLOURS, RC  # noqa: E402
+from sssfit.chart.looks import BLUE, GREY, RULE, VERMILLION  # noqa: E402
+from sssfit.chart.page import (  # noqa: E402
+    LINE_STYLES,
+    LINE_WIDTH,
+    NOTE_SIZE,
+    add_legend,
+    name_axes,
+    new_page,
+    save_figure,
+)
+from sssfit.chart.text import count  # noqa: E402
 
 FULL = 10_000_000
+MINUS = "\N{MINUS SIGN}"
 NAMES = {"R_d": "reflected", "T": "transmitted"}
+STYLES = {
+    name: {"color": colour, "linestyle": dashes, "lw": LINE_WIDTH}
+    for name, colour, dashes in zip(NAMES, (VERMILLION, BLUE), LINE_STYLES, strict=False)
+}
+MOST_MM, LEAST_PERCENT, MOST_PERCENT = 25.0, -100.0, 80.0
+NOTE = (
+    "Difference of the energy in annuli, the multipole's less the walk's, over the walk's; annuli "
+    "of .25 mm, wider where the walk has too few photons. Bands: ±1 standard error of the walk. In "
+    "the panels: the difference of the totals."
+)
 
 
 def draw(axes, what, found):
-    """One case: relative difference of R and T by radius, the walk's noise as bands."""
-    for difference, colour, style in zip(found, COLOURS[::2], ("-", "--"), strict=True):
+    """Draw one case: relative difference of R and T by radius, the walk's noise as bands."""
+    totals = []
+    for difference in found:
         name = difference.what.rsplit(": ", 1)[1]
+        style = STYLES[name]
         # The last bin has no outer edge; curves hold each value across its bin.
         r_mm = np.append(difference.r_mm, difference.r_mm[-1] + 0.25)
         apart = 100.0 * np.append(difference.relative_by_radius, difference.relative_by_radius[-1])
         noise = 100.0 * difference.walk_stderr * difference.energy / difference.walk_energy**2
         noise = np.append(noise, noise[-1])
-        label = f"{NAMES[name]}: total {100.0 * difference.relative:+.1f} %"
-        axes.step(r_mm, apart, where="post", color=colour, linestyle=style, label=label)
-        axes.fill_between(
-            r_mm, apart - noise, apart + noise, step="post", color=colour, alpha=0.2, linewidth=0
-        )
-    axes.axhline(0.0, color="black", linewidth=0.6)
-    axes.set_title(what, loc="left")
-    axes.set_xlim(0.0, 25.0)
-    axes.set_ylim(-100.0, 80.0)
-    axes.legend(loc="lower right")
+        totals.append(f"{NAMES[name]} {100.0 * difference.relative:+.1f} %".replace("-", MINUS))
+        axes.step(r_mm, apart, where="post", **style)
+        band = {"step": "post", "color": style["color"], "alpha": 0.25, "linewidth": 0}
+        axes.fill_between(r_mm, apart - noise, apart + noise, **band)
+    axes.axhline(0.0, color=RULE, lw=0.8, zorder=1)
+    axes.set_xlim(0.0, MOST_MM)
+    axes.set_ylim(LEAST_PERCENT, MOST_PERCENT)
+    text = f"totals: {', '.join(totals)}"
+    axes.text(0.97, 0.06, text, transform=axes.transAxes, ha="right", size=NOTE_SIZE, color=GREY)
+    name_axes(axes, what, "", "")
 
 
 def figure(photons, cases):
-    """All cases."""
-    with mpl.rc_context(RC):
-        page = Figure(figsize=(8.0, 5.2), dpi=150, layout="constrained")
-        for axes, (what, material) in zip(
-            page.subplots(2, 2, sharex=True, sharey=True).flat, cases.items(), strict=False
-        ):
-            draw(axes, what, checks_models.multipole_against_walk(material, what, photons))
-        page.suptitle(
-            f"Multipole against the layered walk: {photons:,} photons, bands ±1 standard error",
-            x=0.01,
-            ha="left",
-            weight="bold",
+    """Draw all cases."""
+    title, where = "Multipole against the layered walk", f"{count(photons)} photons a case, seed 1"
+    with new_page(5.6, title, where, [NOTE]) as (page, below):
+        handles = [Line2D([], [], **each) for each in STYLES.values()]
+        panels = add_legend(below, handles, list(NAMES.values())).subplots(
+            2, 2, sharex=True, sharey=True
         )
-        page.supxlabel("r (mm)", size=8.5)
-        page.supylabel("relative difference of energy in annuli (%)", size=8.5)
-        return page
+        for axes, (what, material) in zip(panels.flat, cases.items(), strict=False):
+            draw(axes, what, checks_models.multipole_against_walk(material, what, photons))
+        for axes in panels[:, 0]:
+            axes.set_ylabel("difference of energy (%)")
+        for axes in panels[1]:
+            axes.set_xlabel("r (mm)")
+    return page
 
 
 def main():
     """Write the figure."""
     photons = int(float(sys.argv[1])) if len(sys.argv) > 1 else FULL
     path = Path(sys.argv[2]) if len(sys.argv) > 2 else ROOT / "docs" / "multipole.png"
-    figure(photons, checks_models.DIFFUSE).savefig(path, metadata={"Software": None})
+    save_figure(figure(photons, checks_models.DIFFUSE), path)
 
 
 if __name__ == "__main__":

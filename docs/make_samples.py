@@ -8,8 +8,9 @@ from make_cascades import row, whole_profile
 from matplotlib.lines import Line2D
 from sections import DOCS, put_section
 
+from sssfit.chart.looks import METHODS, tinted
 from sssfit.chart.page import (
-    COLOURS,
+    LINE_STYLES,
     add_legend,
     draw_bar,
     name_axes,
@@ -39,10 +40,12 @@ CROP = (slice(80, 240), slice(70, 230))  # what is drawn, of all that is measure
 QUADRATIC, IMPORTANCE = (9, 17, 33), (13, 65)
 FETCHES = (14, 24)
 
+# The more samples or fetches, the darker is the method's colour; dashed by importance.
+PASS, CASCADE = METHODS["preintegrated"].colour, METHODS["cascade"].colour
 LINES = (
-    *(("#bbbbbb", "-"), ("#888888", "-"), ("#444444", "-")),
-    *(("#cc79a7", (0, (4, 1.6))), (COLOURS[0], (0, (4, 1.6)))),
-    *((COLOURS[2], "-"), ("black", "-")),
+    *((tinted(PASS, share), "-") for share in (0.35, 0.65, 1.0)),
+    *((tinted(PASS, share), LINE_STYLES[1]) for share in (0.65, 1.0)),
+    *((tinted(CASCADE, 0.5), "-"), (CASCADE, "-")),
 )
 
 TEXT = """## Samples and bands
@@ -68,11 +71,14 @@ def kernels(profile):
     """Yield a label and a table of taps."""
     dense = fit_preintegrated(profile, mm_per_pixel=MM).kernel
     for count in QUADRATIC:
-        yield f"{count} samples", on_taps(dense, count, place="quadratic", profile=profile)
+        taps = on_taps(dense, count, place="quadratic", profile=profile)
+        yield f"{count} samples, quadratic", taps
     for count in IMPORTANCE:
-        yield f"{count} by importance", on_taps(dense, count, place="cumulative", profile=profile)
+        taps = on_taps(dense, count, place="cumulative", profile=profile)
+        yield f"{count} samples, importance", taps
     for budget in FETCHES:
-        yield f"cascade {budget}", fit_taps(profile, fetches=budget, mm_per_pixel=MM).kernel
+        taps = fit_taps(profile, fetches=budget, mm_per_pixel=MM).kernel
+        yield f"cascade, {budget} fetches", taps
 
 
 def lightness(picture, exposure):
@@ -100,15 +106,22 @@ def codes(picture):
     return srgb_encode(np.clip(picture[CROP], 0.0, 1.0))
 
 
+def name_rows(axes):
+    """Write what the two rows of a mosaic are."""
+    axes.set_yticks([0.5, 1.54], ["picture", "its error"])
+
+
 def draw(found, exposure, truth):
     """Draw pictures, errors and spectra."""
     note = (
-        "The middle 16 mm of pictures of 32 mm, pixels of .1 mm. Errors of lightness are amplified "
-        f"{AMPLIFIED:g} times: red is too bright, blue too dark. Spectra: mean over all rows, "
-        "Hann window."
+        "The middle 16 mm of pictures of 32 mm, pixels of .1 mm. Below each picture its error of "
+        f"lightness, amplified {AMPLIFIED:g} times: red is too bright, blue too dark. Curves: "
+        "amplitude of that error at each frequency along x, of its mean square over all rows, Hann "
+        "window. Samples are those of the pre-integrated pass, at quadratic distances or by "
+        "importance."
     )
     title = "skin1: samples, bands and cascades on the nose"
-    with new_page(6.2, title, "Exact profile, light from the side", [note]) as (figure, below):
+    with new_page(6.6, title, "Exact profile, light from the side", [note]) as (figure, below):
         upper, lower = below.subfigures(2, 1, height_ratios=(1.15, 1.0))
         wide = 1.04
         axes = new_mosaic(upper, wide * (len(found) + 1) - 0.04, 2.04)
@@ -116,8 +129,9 @@ def draw(found, exposure, truth):
         for k, (_, _, image, error) in enumerate(found, start=1):
             put_picture(axes, wide * k, 0.0, codes(exposure * image))
             put_difference(axes, wide * k, 1.04, error[CROP], AMPLIFIED)
-        names = ["true kernel", *(label.replace(" by ", "\nby ") for label, *_ in found)]
+        names = ["true kernel", *(label.replace(", ", "\n") for label, *_ in found)]
         axes.set_xticks([wide * k + 0.5 for k in range(len(names))], names)
+        name_rows(axes)
         draw_bar(upper, axes, AMPLIFIED, "CIE L* less that of the true kernel")
         labels = [label for label, *_ in found]
         handles = [Line2D([], [], color=each, ls=style) for each, style in LINES]
@@ -133,7 +147,9 @@ def draw(found, exposure, truth):
         panel.annotate(f"period of {LONGEST_MM:g} mm", (longest, 0.5), (3, 0), **words)
         panel.set_ylim(None, 0.6)
         tick(panel.xaxis)
-        name_axes(panel, "", "cycles a millimetre along x", "CIE L* of the error")
+        name_axes(
+            panel, "", "frequency along x (cycles a millimetre)", "error, root mean square (CIE L*)"
+        )
     save_figure(figure, DOCS / "skin1-samples.png")
 
 

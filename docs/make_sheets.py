@@ -115,11 +115,12 @@ def table(lines):
 
 
 def draw(name, figure):
-    """Write a picture; the contact sheet with 256 colours, a third of its 3 MB."""
+    """Write a picture in all its colours: 256 of them would show as bands on skin."""
     path = DOCS / name
     save_figure(figure, path)
-    if name == "skin1-sheet.png":
-        Image.open(path).convert("RGB").quantize(256, dither=0).save(path, optimize=True)
+    with Image.open(path) as whole:
+        opaque = whole.convert("RGB")
+    opaque.save(path, optimize=True)
 
 
 def write(word, text):

@@ -28,7 +28,7 @@ _LABELS = {
     "Res_SF": "coefficient of a single frame",
     "Res_SF_EMA": "its moving mean",
     "Res_EMCM": "moving covariance",
-    "Res_hat_EMCM": "moving covariance, G of the frame",
+    "Res_hat_EMCM": "moving covariance, G constant in a frame",
     "Res_GT": "true coefficient",
 }
 _COLOURS = (*COLOURS, ORANGE, BLACK, PURPLE)
