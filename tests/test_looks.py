@@ -60,6 +60,8 @@ def test_settings_of_a_method_share_its_colour_and_differ_in_their_marker():
         styles = [found[each] for each in own]
         assert {each["color"] for each in styles} == {METHODS[name].colour}
         assert styles[0]["marker"] == METHODS[name].marker
+    first, second = found["svd"], found["svd 1"]
+    assert second["markersize"] > 1.3 * first["markersize"]  # a ring around it
     seen = {(f["color"], str(f["marker"]), f["markerfacecolor"]) for f in found.values()}
     assert len(seen) == len(labels)
 

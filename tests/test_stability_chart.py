@@ -53,7 +53,7 @@ def own(stress):
 
 
 def look(line):
-    colours = to_hex(line.get_color()), to_hex(line.get_markerfacecolor())
+    colours = to_hex(line.get_color()), to_hex(line.get_markerfacecolor(), keep_alpha=True)
     return *colours, line.get_marker()
 
 

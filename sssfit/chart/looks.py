@@ -97,6 +97,7 @@ _SPARE_COLOURS = ("#332288", "#117733", "#cc6677")
 _SPARE_MARKERS: tuple[Marker, ...] = (">", "H", (4, 1, 0), (6, 1, 0))
 # Of series that are no methods: pictures, numbers of heads.
 SERIES_MARKERS = "os^Dv<>P*X"
+_RING = 1.8  # size of a hollow marker over the filled one's
 # Of one method's kernels with several settings, after its own marker.
 _VARIANT_MARKERS = "os^DvPph8"
 
@@ -156,11 +157,13 @@ def _variant(method: str | None, k: int, points: float) -> Style:
     others = [each for each in _VARIANT_MARKERS if each != own.marker]
     markers = [(own.marker, own.size), *((each, 1.0) for each in others)]
     marker, size = markers[k // 2 % len(markers)]
+    is_hollow = k % 2 == 1  # and wider, a ring around the filled one where both are at one place
     return {
         "color": own.colour,
         "marker": marker,
-        "markersize": points * size,
-        "markerfacecolor": "white" if k % 2 else own.colour,
+        "markersize": points * size * (_RING if is_hollow else 1.0),
+        "markerfacecolor": "none" if is_hollow else own.colour,
+        "markeredgewidth": 0.7,
         "linestyle": LINE_STYLES[k % len(LINE_STYLES)],
     }
 
