@@ -178,19 +178,18 @@ def chart(rows, cascades, ours, shipped, relatives):
         axes.set_ylim(0.07, 130.0)
         mean = "99th percentile of ΔE 2000,\nmean over eight pictures"
         name_axes(axes, "", "texture fetches a pixel", mean)
-        tie(axes, letters, shipped)
+    tie(axes, letters, shipped)
     save_figure(figure, DOCS / "skin1-fetches.png")
 
 
 def tie(axes, letters, shipped):
-    """Draw a dot for each engine's sampler, and its letter over all lines, tied to it."""
-    axes.figure.draw_without_rendering()  # places in points are known after the layout
+    """Draw a dot for each engine's sampler on a page with its layout, tied to its letter."""
     order = sorted(zip(letters, shipped, strict=True), key=lambda each: (each[1][1], -each[1][3]))
     places = axes.transData.transform([(f, e) for _, (_, f, _, e) in order])
     circle = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": RULE, "lw": 0.6}
     words = {"size": NOTE_SIZE, "weight": "bold", "ha": "center", "va": "center", "color": GREY}
     line = {"arrowstyle": "-", "color": RULE, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
-    points = 72.0 / axes.figure.dpi
+    points = 72.0 / axes.get_figure(root=True).dpi
     for (letter, (_, fetches, _, error)), x in zip(
         order, apart(points * places[:, 0]), strict=True
     ):

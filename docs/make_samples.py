@@ -147,9 +147,7 @@ def draw(found, exposure, truth):
         panel.annotate(f"period of {LONGEST_MM:g} mm", (longest, 0.5), (3, 0), **words)
         panel.set_ylim(None, 0.6)
         tick(panel.xaxis)
-        name_axes(
-            panel, "", "frequency along x (cycles a millimetre)", "error, root mean square (CIE L*)"
-        )
+        name_axes(panel, "", "frequency along x (cycles a millimetre)", "amplitude (CIE L*)")
     save_figure(figure, DOCS / "skin1-samples.png")
 
 

@@ -18,9 +18,9 @@ from sssfit.chart.data import picture
 from sssfit.chart.files import FORMATS, chart_format, is_chart_file
 from sssfit.chart.frequency import frequency_figure
 from sssfit.chart.material import material_figure
-from sssfit.chart.page import drawable, save_figure
+from sssfit.chart.page import drawable, save_figure, short_number
 from sssfit.chart.profile import profile_figure
-from sssfit.chart.text import channel_name, channel_names, count, shortened, with_error
+from sssfit.chart.text import channel_name, channel_names, count, powered, shortened, with_error
 from sssfit.errors import FileError
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
@@ -490,3 +490,15 @@ def test_charts_of_materials_are_legible_and_the_same_each_time(name):
         save_figure(figure, stream, format="svg")
         written.append(stream.getvalue())
     assert written[0] == written[1]
+
+
+def test_small_and_large_numbers_are_written_with_powers_of_ten():
+    """On axes of media whose pixels have nanometres, 5e-05 is no way to write a number."""
+    labels = {
+        0.0005: "0.0005",
+        5e-05: r"$5\cdot 10^{-5}$",
+        1e6: "$10^{6}$",
+        -0.5: "\N{MINUS SIGN}0.5",
+    }
+    assert {value: short_number(value) for value in labels} == labels
+    assert powered("3.679e-06 mm to 5e+03 mm") == "3.679×10⁻⁶ mm to 5×10³ mm"  # noqa: RUF001

@@ -16,6 +16,7 @@ from sssfit.chart.page import (
     drawable,
     name_axes,
     new_page,
+    short_number,
     tick_decades,
 )
 from sssfit.chart.text import channel_names, shortened, spread
@@ -155,7 +156,7 @@ def _limit(axes: Axes) -> None:
     middle = math.sqrt(low * high)
     axes.set_ylim(min(low / 1.5, middle / 3.2), max(high * 1.5, middle * 3.2))
     tick_decades(axes.yaxis, 6)
-    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_major_formatter(short_number)
 
 
 def _notes(material: Material, shown: Sequence[int]) -> list[str]:

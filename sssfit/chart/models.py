@@ -20,7 +20,6 @@ from matplotlib.ticker import (
     FuncFormatter,
     NullFormatter,
     NullLocator,
-    StrMethodFormatter,
 )
 
 from sssfit.arrays import FloatArray
@@ -32,6 +31,7 @@ from sssfit.chart.page import (
     draw_steps,
     name_axes,
     new_page,
+    short_number,
     tick_decades,
 )
 from sssfit.chart.text import (
@@ -182,7 +182,7 @@ def _limit(panels: npt.NDArray[Any], comparison: ModelComparison, shown: Sequenc
     panels[0, 0].set_xlim(
         0.5 * first_mm, max(comparison.edges_mm[c][-1] for c in shown) or first_mm
     )
-    panels[0, 0].xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    panels[0, 0].xaxis.set_major_formatter(FuncFormatter(short_number))
     panels[0, 0].xaxis.set_minor_formatter(NullFormatter())
 
 

@@ -22,9 +22,11 @@ from sssfit.chart.page import (
     add_legend,
     name_axes,
     new_page,
+    short_number,
     tick,
     tick_decades,
 )
+from sssfit.chart.text import powered
 
 if TYPE_CHECKING:
     from sssfit.motion.record import MovingLight, Track
@@ -72,9 +74,10 @@ def moving_light_figure(moving: MovingLight) -> Figure:
 def _subtitle(moving: MovingLight) -> str:
     down, right = moving.shift
     moved = f" · each moved {right} right and {down} down" if down or right else ""
+    pitch = powered(f"{moving.mm_per_pixel:.4g}")
     return (
         f"{len(moving.intensity)} frames of {moving.width} x {moving.height} pixels of "
-        f"{moving.mm_per_pixel:.4g} mm{moved} · target variance {moving.target_variance:g} · seed "
+        f"{pitch} mm{moved} · target variance {moving.target_variance:g} · seed "
         f"{moving.seed}"
     )
 
@@ -82,7 +85,7 @@ def _subtitle(moving: MovingLight) -> str:
 def _label(moving: MovingLight, track: Track) -> str:
     """Return a renderer with its means: fetches and error."""
     share = moving.relative(track)
-    error = "" if share is None else f", error {100.0 * share:.3g} %"
+    error = "" if share is None else powered(f", error {100.0 * share:.3g} %")
     return f"{track.label}: {track.mean_fetches:.3g} fetches{error}"
 
 
@@ -121,7 +124,7 @@ def _log(axes: Axes, low: float, high: float) -> None:
     axes.set_yscale("log")
     axes.set_ylim(low, high)
     tick_decades(axes.yaxis, 6)
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(short_number))
 
 
 def _shade(axes: Axes, frames: FloatArray, intensity: FloatArray) -> None:
@@ -161,6 +164,6 @@ def _draw_maps(place: SubFigure, adaptive: list[Track]) -> None:
                 axes.set_title(track.label, loc="left")
         bar = place.colorbar(image, ax=list(grid[k]), label=name, shrink=0.9, aspect=14, pad=0.01)
         bar.ax.yaxis.set_minor_locator(NullLocator())
-        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        bar.ax.yaxis.set_major_formatter(FuncFormatter(short_number))
         if k == 0:
             bar.set_ticks(_SAMPLE_TICKS)

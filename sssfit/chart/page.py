@@ -30,12 +30,12 @@ from matplotlib.legend_handler import HandlerBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import StepPatch
 from matplotlib.ticker import (
+    FuncFormatter,
     LogLocator,
     MaxNLocator,
     NullFormatter,
     NullLocator,
     ScalarFormatter,
-    StrMethodFormatter,
 )
 from matplotlib.transforms import Bbox
 
@@ -261,7 +261,17 @@ def has_letters_of(text: str) -> bool:
 def tick(axis: Axis) -> None:
     """Tick a linear axis at round numbers, in plain notation."""
     axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_major_formatter(FuncFormatter(short_number))
+
+
+def short_number(value: float, _: object = None) -> str:
+    """Return a tick's label: 0.002, and 2·10⁻⁶ where plain text would have 2e-06."""
+    plain = f"{value:g}"
+    if "e" not in plain:
+        return plain.replace("-", "\N{MINUS SIGN}")
+    digits, power = plain.split("e")
+    factor = "" if digits == "1" else rf"{digits}\cdot "
+    return f"${factor}10^{{{int(power)}}}$"
 
 
 def tick_decades(axis: Axis, most: int) -> None:
@@ -289,7 +299,7 @@ def draw_curve(
 
 def label_minor(axis: Axis, is_labelled: bool) -> None:
     """Label minor ticks, or none; labels need marks, and line up with those of the major ones."""
-    axis.set_minor_formatter("{x:g}" if is_labelled else NullFormatter())
+    axis.set_minor_formatter(FuncFormatter(short_number) if is_labelled else NullFormatter())
     if is_labelled:
         axis.set_tick_params(which="minor", length=2.0, width=0.6, pad=5.0)
 

@@ -30,6 +30,7 @@ from sssfit.chart.page import (
     lay_out,
     name_axes,
     new_page,
+    short_number,
 )
 from sssfit.chart.text import kernel_subtitle, shortened, titled
 from sssfit.messages import counted
@@ -366,14 +367,14 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
     least = min(*errors, top / 10.0)
     axes.set_ylim(least * (least / top) ** 0.16, top * (top / least) ** 0.06)
     axes.yaxis.set_major_locator(LogLocator(numticks=6))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(short_number))
     axes.yaxis.set_minor_locator(NullLocator())
     if cost == "seconds" or len(set(costs)) > _MOST_TICKS:
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=12))
     else:
         axes.xaxis.set_major_locator(FixedLocator(sorted(set(costs))))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(short_number))
 
 
 def _title(comparison: Comparison, error: str, cost: str) -> str:

@@ -22,6 +22,7 @@ from sssfit.chart.page import (
     add_table,
     name_axes,
     new_page,
+    short_number,
 )
 from sssfit.chart.text import (
     channel_name,
@@ -105,7 +106,7 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
     least = float(squared[squared > 0.0].min(initial=100.0))
     axes.set_ylim(max(least / 2.0, 10.0 ** (2 - _DECADES)), 160.0)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(short_number))
     axes.yaxis.set_minor_locator(NullLocator())
 
 

@@ -25,6 +25,7 @@ from sssfit.chart.page import (
     add_legend,
     name_axes,
     new_page,
+    short_number,
     tick,
     tick_decades,
 )
@@ -40,7 +41,6 @@ _SAFE, _SMALL, _POINTS = "#e8f3ec", 6.5, 3.4
 _HEADROOM = 0.25  # of the axis above the limit, at least
 _BELOW = 0.05  # of the axis below 0, so that points at 0 are whole
 _CROWDED = 3  # curves; above more stands their legend. Of as many labels it is the largest
-_PLAIN = 1e-3, 1e5  # between these a number is written without a power of ten
 _SHORT_DECADES = 1.3  # as `tick_decades` has it
 _LEGEND_LINE = 0.135  # of the axis of a crowded panel
 
@@ -152,17 +152,7 @@ def _tick_decades(axis: Axis, most: int) -> None:
     tick_decades(axis, most)
     low, high = axis.get_view_interval()
     if math.log10(high / low) < _SHORT_DECADES:
-        axis.set_major_formatter(lambda value, _: _short(value))
-        axis.set_minor_formatter(lambda value, _: _short(value))
-
-
-def _short(value: float) -> str:
-    """Return a tick's label: 0.01, but 2·10⁻⁶ in place of 2e-06."""
-    if value == 0.0 or _PLAIN[0] <= abs(value) < _PLAIN[1]:
-        return f"{value:g}"
-    power = math.floor(math.log10(abs(value)) + 1e-9)
-    digits = f"{value / 10.0**power:g}"
-    return rf"$10^{{{power}}}$" if digits == "1" else rf"${digits}\cdot 10^{{{power}}}$"
+        axis.set_major_formatter(short_number)
 
 
 def _line(axes: Axes, curve: Curve, style: Style) -> Line2D:

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,6 +29,7 @@ _METHODS = {
 _MOST_IN_LEGEND = 8
 _MOST_DECIMALS = 12
 _MOST_TOLD = 4  # names that a note repeats
+_POWER = re.compile(r"(?<=\d)e([+-]\d+)")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -68,7 +70,7 @@ def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
     """Return text about the pixels of a kernel and the method of its profile."""
     meta = profile.meta
     parts = [method_name(meta["method"])] if meta.get("method") else []
-    parts.append(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm")
+    parts.append(powered(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm"))
     if version := meta.get("version"):
         parts.append(f"sssfit {shortened(version)}")
     return " · ".join(parts)
@@ -77,6 +79,14 @@ def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
 def symbols(words: str) -> str:
     """Return the words of a record as charts write them; records have them in plain letters."""
     return words.replace("Delta E", "ΔE")
+
+
+def powered(words: str) -> str:
+    """Return text whose numbers such as 3.7e-06 are written as 3.7×10⁻⁶."""
+    return _POWER.sub(
+        lambda found: f"×10{str(int(found[1])).translate(_SUPERSCRIPTS)}",  # noqa: RUF001
+        words,
+    )
 
 
 def method_name(method: object) -> str:
@@ -88,7 +98,8 @@ def grid(profile: Profile) -> str:
     """Return text about the annuli: number, width if equal, and outer radius."""
     width_mm = np.diff(profile.r_edges_mm)
     spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
-    return f"{counted(profile.n_annuli, 'annulus')}{spacing} to r = {profile.r_edges_mm[-1]:.4g} mm"
+    end = f"{profile.r_edges_mm[-1]:.4g} mm"
+    return powered(f"{counted(profile.n_annuli, 'annulus')}{spacing} to r = {end}")
 
 
 def count(number: int) -> str:
@@ -180,7 +191,7 @@ def shortened(name: str, longest: int = 12) -> str:
 
 def footnotes(profile: Profile, image: str) -> list[str]:
     """Return the notes on the curves and the ``image``."""
-    reach = f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm)"
+    reach = powered(f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm)")
     notes = [
         f"{_through(profile)}{reach}: {_beyond(profile)} of diffuse. "
         f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
@@ -232,9 +243,10 @@ def image_note(profile: Profile, image: Picture) -> str:
     if profile.n_channels != 3:
         return ""
     named = "" if profile.channels == ("R", "G", "B") else " of the channels as R, G, B"
+    exposure = powered(f"{image.exposure_per_mm2:.2g}")
     return (
         f"(d): linear light{named}, tone curve x/(1 + x) with x = 1 at "
-        f"{image.exposure_per_mm2:.2g}/mm², encoded as sRGB."
+        f"{exposure}/mm², encoded as sRGB."
     )
 
 
