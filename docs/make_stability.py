@@ -69,7 +69,11 @@ def main():
     parser.add_argument("--paper", action="store_true")
     parser.add_argument("--again", action="store_true")
     given = parser.parse_args()
-    for each in material_names(paper=True) if given.paper else given.materials:
+    materials = material_names(paper=True) if given.paper else given.materials
+    missing = [each for each in materials if given.again and not kept(each).exists()]
+    if missing:
+        parser.error(f"no figures are kept of {', '.join(missing)}: run it once without --again.")
+    for each in materials:
         make(each, again=given.again)
 
 
