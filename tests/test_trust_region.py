@@ -20,6 +20,10 @@ def saddle_curvature(x):
     return found
 
 
+def _never(_value):
+    return False
+
+
 CASES = {
     "a curved valley": (
         lambda x: (float(optimize.rosen(x)), optimize.rosen_der(x)),
@@ -47,7 +51,7 @@ def test_every_step_is_that_of_scipy(case, most):
         method="trust-ncg",
         options={"maxiter": most, "gtol": 1e-14},
     )
-    ours = minimise(function, hessian, x, most=most, has_ended=lambda value: False)
+    ours = minimise(function, hessian, x, most=most, has_ended=_never)
     assert ours.x.tolist() == theirs.x.tolist()
     assert (ours.fun, ours.nfev) == (theirs.fun, theirs.nfev)
 
@@ -61,7 +65,8 @@ def test_it_ends_when_it_is_told_to():
 
     function, hessian, x = CASES["a curved valley"]
     found = minimise(function, hessian, x, most=60, has_ended=has_ended)
-    assert found.nfev == 5 and found.fun == values[-1]
+    assert found.nfev == 5
+    assert found.fun == values[-1]
 
 
 @pytest.mark.parametrize("which", ["gradient", "curvature"])
@@ -72,4 +77,4 @@ def test_what_is_not_finite_ends_in_an_error_not_in_endless_steps(which):
         "curvature": (function, lambda x: np.full((x.size, x.size), np.nan)),
     }[which]
     with pytest.raises(ValueError, match="infs or NaNs"):
-        minimise(*bad, x, most=5, has_ended=lambda value: False)
+        minimise(*bad, x, most=5, has_ended=_never)

@@ -324,7 +324,8 @@ def searched(
         found.append(descent(few, x, 40))
         best = min(best, found[-1], key=lambda each: each.fun)
     best = descent(many, best.x, 200, gain=1e-5)
-    return best.x, sum(each.nfev for each in (*rough, *found, best))
+    evaluations = sum(each.nfev for each in rough) + sum(each.nfev for each in (*found, best))
+    return best.x, evaluations
 
 
 def _of_one_shape(chain: Chain, seed: int) -> list[FloatArray]:
