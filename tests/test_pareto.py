@@ -28,6 +28,7 @@ from sssfit.compare.references import border_of, evaluated_scene
 from sssfit.errors import FitError, RenderError
 from sssfit.material import load_material
 from sssfit.measure.score import COLOUR_FIGURES, measure
+from sssfit.methods import FITS, Method
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.scene.made import make_scene
@@ -277,6 +278,19 @@ def test_only_the_methods_asked_for_are_compared(skin1, scenes):
     assert {each.method for each in every_candidate(9)} > {"cascade", "svd", "weighted"}
     dense = {each.label for each in candidates(9)}
     assert {each.label for each in every_candidate(9)} > dense
+
+
+def test_a_fit_of_which_nothing_is_said_is_compared_with_its_defaults(monkeypatch):
+    before = every_candidate(41)
+    monkeypatch.setitem(FITS, "new", Method("sssfit.fit.svd:fit_svd", "-"))
+    monkeypatch.setitem(FITS, "newer", Method("sssfit.fit.disk:fit_disk", "-", makes_taps=True))
+    found = [each for each in every_candidate(41) if each not in before]
+    assert [(each.label, each.method, each.terms) for each in found] == [
+        ("new", "new", 1),
+        *((f"new on {taps} taps", "new", 1) for taps in (5, 11, 25)),
+        ("newer", "newer", 0),
+    ]
+    assert missing(41, 0.3, ["new", "newer"]) == []
 
 
 def test_support_is_handed_to_the_fits(skin1, scenes):

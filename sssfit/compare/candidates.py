@@ -1,9 +1,11 @@
 """The kernels that are compared: every method, dense and on taps; cascades and relatives.
 
 Dense kernels have a weight for every pixel of a pass, which no shader applies; on taps they are
-thinned to the bilinear fetches of a budget.
+thinned to the bilinear fetches of a budget. A method of ``FITS`` for which nothing is said here is
+compared with its defaults.
 """
 
+import functools
 import time
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -14,7 +16,7 @@ from sssfit.errors import SssfitWarning
 from sssfit.fit import FitResult, TapsFit, fit_separable, fit_taps
 from sssfit.fit.guided import MOST_PIXELS
 from sssfit.fit.on_taps import on_taps
-from sssfit.methods import TAPS
+from sssfit.methods import FITS, TAPS
 from sssfit.profile import Profile
 
 MOST_TERMS = 6  # of the papers' comparisons
@@ -123,7 +125,7 @@ def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate,
         Most terms of svd and gaussians.
     """
     most = min(most_terms, pixels // 2 + 1)
-    found = [*_one_pass(pixels), *_several(most)]
+    found = [*_one_pass(pixels), *_several(most), *_by_default(makes_taps=False)]
     return tuple(sorted(found, key=lambda each: each.terms))
 
 
@@ -138,8 +140,10 @@ def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[C
         Names of methods.
     """
     dense = [*candidates(pixels), *_weighted(pixels)]
-    thinned = on_budgets([each for each in dense if each.label in _THINNED], pixels)
-    found = [*dense, *thinned, *_cascades(), *_relatives(), *_disks(pixels)]
+    few = {*_THINNED, *(each.label for each in _by_default(makes_taps=False))}
+    thinned = on_budgets([each for each in dense if each.label in few], pixels)
+    chains = [*_cascades(), *_relatives(), *_disks(pixels), *_by_default(makes_taps=True)]
+    found = [*dense, *thinned, *chains]
     return tuple(each for each in found if only is None or each.method in only)
 
 
@@ -229,3 +233,19 @@ def _disks(pixels: int) -> Iterator[Candidate]:
     for taps in DISKS:
         if taps <= pixels**2:
             yield Candidate(f"disk {taps}", "disk", 0, {"taps": taps})
+
+
+def _by_default(*, makes_taps: bool) -> Iterator[Candidate]:
+    """Yield a kernel with default settings by each method of ``FITS`` that has none above."""
+    for name, each in FITS.items():
+        if each.makes_taps == makes_taps and name not in _with_settings():
+            terms = each.count_of({})
+            yield Candidate(name, name, 0 if makes_taps else int(terms or 1))
+
+
+@functools.cache
+def _with_settings() -> frozenset[str]:
+    """Return the methods of which this file says what is compared."""
+    room = MOST_PIXELS  # for each of them
+    dense = [*_one_pass(room), *_several(1), *_weighted(room)]
+    return frozenset(each.method for each in (*dense, *_cascades(), *_relatives(), *_disks(room)))
