@@ -10,6 +10,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, NoReturn
 
 import click
@@ -21,22 +22,12 @@ from sssfit.messages import printable
 from sssfit.process import is_out_of_memory, keep_memory
 
 from ._options import in_options
-from .chart import chart
-from .choose import choose
-from .compare import compare
-from .export import export
-from .fit import fit
-from .import_ import import_
-from .materials import materials
-from .motion import motion
-from .render import render
-from .report import report
-from .scene import scene
-from .show import show
-from .simulate import simulate
-from .stability import stability
-from .sweep import sweep
 
+# In the order of their help; each is a file here with a command of its name.
+_VERBS = (
+    *("materials", "simulate", "sweep", "fit", "render", "compare", "choose", "stability"),
+    *("motion", "scene", "import_", "export", "chart", "report", "show"),
+)
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
     *("colour-science", "OpenImageIO", "click", "rich", "jinja2", "markupsafe"),
@@ -79,11 +70,8 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (
-    *(materials, simulate, sweep, fit, render, compare, choose, stability, motion, scene),
-    *(import_, export, chart, report, show),
-):
-    cli.add_command(_verb)
+for _verb in _VERBS:
+    cli.add_command(getattr(import_module(f".{_verb}", __package__), _verb))
 
 
 def run(args: Sequence[str] | None) -> NoReturn:
