@@ -1,8 +1,9 @@
 """The options of verbs, a row an option: name, type, what stands for the value, help, default.
 
-Those of methods and of made pictures are made from their entries, in ``_methods``.
+Those of methods and of made pictures are made from their entries, in ``_options``.
 """
 
+from sssfit import methods
 from sssfit.methods import EXPORTS, FITS, LIGHTS, PRESETS, RENDERERS, SAVINGS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
@@ -102,8 +103,9 @@ COMPARE = (
     option("--rank", WholeRange(1, 1000), "N", "svd: rank of the budget's kernel.  [default: 3]"),
     option("--terms", WholeRange(1, 10), "N", "gaussians: number of Gaussians of the budget's "
            "kernel.  [default: 4]"),
-    option("--model", ["dipole", "dipole-grosjean", "burley", "multipole"], None, "Profile model "
-           "of the budget's kernel; multipole for layers.  [default: the photon walk]"),
+    option("--model", [*methods.OF_HALF_SPACES, *methods.OF_LAYERS], None, "Profile "
+           f"model of the budget's kernel; {', '.join(methods.OF_LAYERS)} for layers.  [default: "
+           "the photon walk]"),
     option("-o --output", None, "FOLDER", "Folder of NAME-pareto.png and NAME-pareto.md with "
            "--all or --paper.  [default: here]"),
     flag("--force", "Replace an input, or files that are not our charts or tables."),

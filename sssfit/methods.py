@@ -98,6 +98,9 @@ class Method:
         Whether a fit starts at random places, and takes a ``seed``.
     makes : str, optional
         Name of the only profile it makes, without a material; that name needs no ``--method``.
+    solves : str
+        Of a simulation "transport", or "half spaces" or "layers" for a diffusion model of such,
+        which is then compared with the exact solution wherever models are.
     """
 
     function: str
@@ -108,6 +111,7 @@ class Method:
     makes_taps: bool = False
     is_seeded: bool = False
     makes: str | None = None
+    solves: str = ""
 
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
@@ -255,6 +259,7 @@ SIMULATIONS: Mapping[str, Method] = {
             Setting("resume", "flag", "continue a killed or interrupted run from its checkpoint."),
         ),
         shares=True,
+        solves="transport",
     ),
     "exact": Method(
         "sssfit.simulate:simulate_exact_many",
@@ -276,17 +281,22 @@ SIMULATIONS: Mapping[str, Method] = {
             _ANGLES,
         ),
         shares=True,
+        solves="transport",
     ),
     "dipole": Method(
-        "sssfit.simulate:simulate_dipole", "diffusion, Jensen et al. 2001; half spaces only"
+        "sssfit.simulate:simulate_dipole",
+        "diffusion, Jensen et al. 2001; half spaces only",
+        solves="half spaces",
     ),
     "dipole-grosjean": Method(
         "sssfit.simulate:simulate_dipole_grosjean",
         "the same with Grosjean's diffusion coefficient",
+        solves="half spaces",
     ),
     "multipole": Method(
         "sssfit.simulate:simulate_multipole",
         "diffusion, Donner and Jensen 2005; also for slabs and layers",
+        solves="layers",
     ),
     "burley": Method(
         "sssfit.simulate:simulate_burley",
@@ -302,6 +312,7 @@ SIMULATIONS: Mapping[str, Method] = {
                 default="perpendicular",
             ),
         ),
+        solves="half spaces",
     ),
     "gaussians": Method(
         "sssfit.simulate:simulate_deon_skin",
@@ -309,6 +320,15 @@ SIMULATIONS: Mapping[str, Method] = {
         makes=DEON_SKIN,
     ),
 }
+
+
+def _that_solve(what: str) -> tuple[str, ...]:
+    return tuple(name for name, each in SIMULATIONS.items() if each.solves == what)
+
+
+# What follows all scattering, and the diffusion models that are compared with it.
+TRANSPORT = _that_solve("transport")
+OF_HALF_SPACES, OF_LAYERS = _that_solve("half spaces"), _that_solve("layers")
 
 _ENERGY = Setting(
     "energy",

@@ -307,7 +307,7 @@ def test_a_stack_has_a_budget_against_its_exact_profile(caplog):
     with caplog.at_level("INFO", logger="sssfit"):
         found = error_budget(material, scene, photons=20_000)
     assert any(
-        "dipoles and normalised diffusion, which are of such, are left out" in each
+        "dipole, dipole-grosjean, burley, which are of such, are left out" in each
         for each in caplog.messages
     )
     names = [each.name for each in found.causes]

@@ -15,12 +15,16 @@ from sssfit import fit
 from sssfit.cli import cli
 from sssfit.cli._options import in_options, method_options
 from sssfit.cli.chart import _OF_CHARTS
+from sssfit.compare.covered import MODELS
 from sssfit.compare.drawing import _FILES, computed, drawn_of
 from sssfit.errors import ProfileError
 from sssfit.methods import (
     FITS,
+    OF_HALF_SPACES,
+    OF_LAYERS,
     SEPARABLE,
     SIMULATIONS,
+    TRANSPORT,
     VIEWS,
     Method,
     Setting,
@@ -97,6 +101,16 @@ def test_the_library_has_the_methods_of_the_registry():
     for name, method in SEPARABLE.items():
         assert fit.METHODS[name].fit is method.load()
         assert fit.METHODS[name].summary == method.summary
+
+
+def test_every_simulation_says_what_it_solves_or_makes():
+    """Comparisons, stresses and ``--model`` take the models from what they solve."""
+    known = {"transport": TRANSPORT, "half spaces": OF_HALF_SPACES, "layers": OF_LAYERS}
+    for name, each in SIMULATIONS.items():
+        assert bool(each.solves) != bool(each.makes)
+        assert each.makes or name in known[each.solves]
+    (model,) = [each for each in cli.commands["compare"].params if each.name == "model"]
+    assert [*model.type.choices] == [*MODELS] == [*OF_HALF_SPACES, *OF_LAYERS]
 
 
 @pytest.mark.parametrize("name", [name for name, each in SEPARABLE.items() if each.counted])

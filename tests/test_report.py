@@ -533,7 +533,8 @@ def test_a_page_of_layers_has_the_models_and_budgets_of_layers(caplog):
     ]
     assert {each.scene.name for each in made.budgets} == {"disk", "edge"}
     assert made.models.exact.profile is made.profile  # not solved for again
-    assert caplog.text.count("stack is not one half space: dipoles and normalised") == 1
+    assert made.profile.meta["method"] == "exact"
+    assert caplog.text.count("stack is not one half space: dipole, dipole-grosjean, burley") == 1
 
 
 def test_what_does_not_cover_a_material_is_left_out_with_a_note(caplog, monkeypatch):

@@ -230,7 +230,7 @@ def _total_with_error(curve: ModelCurve, channel: int) -> str:
     error = 100.0 * float(curve.total_error[channel])
     if curve.method == "exact" or math.isnan(error):
         return f"{total:#.4g}"
-    if curve.method == "burley":
+    if "reflectance" in (curve.profile.meta.get("settings") or {}):
         return f"{total:#.4g} (given)"
     signed = f"{error:+.{2 if abs(error) < 1.0 else 1}f}".replace("-", _MINUS)
     if curve.profile.photons is not None:

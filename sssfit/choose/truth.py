@@ -21,6 +21,7 @@ from sssfit.errors import (
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.messages import note, number
+from sssfit.methods import TRANSPORT
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
 from sssfit.simulate._deterministic import check_is_material
@@ -28,7 +29,6 @@ from sssfit.simulate.truth import exact_with_all_light, radius_of
 
 WALK_PHOTONS = 10_000_000  # the papers' number
 _WORTH_A_NOTE = 1e-3  # of the light
-_TRANSPORT = ("exact", "montecarlo")
 
 
 def truth_of(
@@ -81,7 +81,7 @@ def material_of(source: Material | Profile) -> Material | None:
     if isinstance(source, Material):
         return source
     record = source.meta.get("material")
-    is_transport = source.meta.get("method") in _TRANSPORT and "beam" not in source.meta
+    is_transport = source.meta.get("method") in TRANSPORT and "beam" not in source.meta
     if not is_transport or not isinstance(record, Mapping):
         return None
     try:

@@ -4,16 +4,16 @@ Dipoles and normalised diffusion are of half spaces; with g they are given (1 - 
 so. A slab or a stack has the multipole, unless a layer is too thin or does not scatter.
 """
 
+import inspect
 from typing import Any
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.material import Material
+from sssfit.methods import OF_HALF_SPACES, OF_LAYERS, SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate import simulate
 
-OF_HALF_SPACES = ("dipole", "dipole-grosjean", "burley")
-OF_LAYERS = ("multipole",)
 MODELS = (*OF_HALF_SPACES, *OF_LAYERS)
 
 
@@ -31,7 +31,7 @@ def model_profiles(
     ----------
     material : Material
     reflectance : (C,)
-        The exact total, which normalised diffusion is told, as by an artist.
+        The exact total, which a model that takes one is told, as by an artist.
     **grid
         ``dr_mm`` and ``radius_mm``; see `sssfit.grid.make_grid`.
     """
@@ -39,11 +39,12 @@ def model_profiles(
     left: tuple[str, ...] = ()
     if not material.is_semi_infinite:
         left = (
-            f"{material.name} is not one half space: dipoles and normalised diffusion, which are "
-            "of such, are left out.",
+            f"{material.name} is not one half space: {', '.join(OF_HALF_SPACES)}, which are of "
+            "such, are left out.",
         )
     for name in models_of(material):
-        own = {"reflectance": reflectance} if name == "burley" else {}
+        known = inspect.signature(SIMULATIONS[name].load()).parameters
+        own = {"reflectance": reflectance} if "reflectance" in known else {}
         try:
             found[name] = simulate(material, name, **grid, **own)
         except SimulationError as refusal:

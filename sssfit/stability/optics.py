@@ -12,8 +12,9 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.fit import FitResult, fit_gaussians
 from sssfit.material import Layer, Material
+from sssfit.methods import OF_HALF_SPACES
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_burley, simulate_dipole, simulate_dipole_grosjean
+from sssfit.simulate import simulate
 from sssfit.simulate.exact import simulate_exact_many
 from sssfit.stability.curve import Axis, Curve
 from sssfit.stability.panel import Panel
@@ -25,11 +26,6 @@ CONDITION_LIMIT = 1e8  # half of double precision's digits
 ALBEDOS = (0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.997, 0.999, 0.9999, 0.99999)
 _INDICES = (1.0, 1.3, 1.5, 2.0)
 _OWN_INDEX = 1.4
-_MODELS = {
-    "dipole": simulate_dipole,
-    "dipole-grosjean": simulate_dipole_grosjean,
-    "burley": simulate_burley,
-}
 _WIDE = "an exact or walked profile with a larger radius"
 
 
@@ -57,7 +53,7 @@ def stress(subject: Subject) -> list[Panel]:
             title="diffusion models beside the exact profile",
             y_label="share in the wrong annulus",
             limit=MODEL_LIMIT,
-            curves=[_model(subject, name) for name in _MODELS],
+            curves=[_model(subject, name) for name in OF_HALF_SPACES],
             fails="diffusion does not hold near the beam",
         ),
         Panel(
@@ -120,7 +116,8 @@ def _model(subject: Subject, name: str) -> Curve:
     errors = []
     for albedo, exact in zip(ALBEDOS, _profiles(_OWN_INDEX, subject.threads), strict=True):
         dr_mm, radius_mm = float(exact.r_edges_mm[1]), float(exact.r_edges_mm[-1])
-        model = _MODELS[name](_material(albedo, _OWN_INDEX), dr_mm=dr_mm, radius_mm=radius_mm)
+        material = _material(albedo, _OWN_INDEX)
+        model = simulate(material, name, dr_mm=dr_mm, radius_mm=radius_mm)
         apart = np.abs(model.annulus_energy - exact.annulus_energy).sum()
         apart += np.abs(model.beyond_grid - exact.beyond_grid).sum()
         errors.append(0.5 * float(apart) / float(exact.diffuse_reflectance[0]))

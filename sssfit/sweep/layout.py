@@ -6,19 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from sssfit.methods import TRANSPORT
 from sssfit.profile import Profile
 from sssfit.sweep.plan import Plan
 from sssfit.sweep.tasks import Done
 from sssfit.sweep.variables import ABSORBED, ALWAYS, FINGERPRINT, KERNEL, TRANSMITTED, Variable
 
 _MOST_IN_CHUNK = 256  # points of the last axis
-_KNOWS_ABSORBED = ("montecarlo", "exact")
 
 
 def variables_of(plan: Plan) -> list[Variable]:
     """Return the arrays of a plan's points, without the fingerprint."""
     found = [*ALWAYS]
-    found += [ABSORBED] * (plan.method in _KNOWS_ABSORBED)
+    found += [ABSORBED] * (plan.method in TRANSPORT)  # others do not know it
     found += TRANSMITTED if _is_finite(plan) else ()
     return found + [KERNEL] * (plan.fit is not None)
 
