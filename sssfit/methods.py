@@ -211,6 +211,21 @@ class View:
             raise ValueError(f"the view of {self.record} is computed; give its page, too.")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measure(Method):
+    """A figure of a picture beside the true one; its ``summary`` is its name in reports.
+
+    Its function takes (image, truth, exposure, mask=...), as `sssfit.measure.structure.ssim`.
+
+    Parameters
+    ----------
+    of_colours : bool
+        Whether it is of grey and of three channels alone; of others it is then NaN.
+    """
+
+    of_colours: bool = False
+
+
 _ANGLES = Setting(
     "angles",
     "whole",
@@ -807,6 +822,12 @@ RENDERERS: Mapping[str, Method] = {
     "fixed": Method("sssfit.motion.ways:fixed", "fixed sampling"),
     "separable": Method("sssfit.motion.ways:separable", "separable kernel"),
     "cascade": Method("sssfit.motion.ways:cascade", "cascade of taps"),
+}
+
+# What ``sssfit render --structure`` measures beside Delta E 2000.
+MEASURES: Mapping[str, Measure] = {
+    "ssim": Measure("sssfit.measure.structure:ssim", "SSIM"),
+    "flip": Measure("sssfit.measure.structure:flip", "FLIP", of_colours=True),
 }
 
 # What diffusion in texture space may leave out.

@@ -13,6 +13,7 @@ from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.delta_e import BLOCK_PIXELS, delta_e_2000, lab
 from sssfit.measure.score import COLOUR_FIGURES
+from sssfit.methods import MEASURES, Measure
 
 
 def pictures(height=20, width=24, channels=3, seed=1):
@@ -44,6 +45,16 @@ def test_identical_pictures_differ_in_nothing(channels):
     assert score.ssim == pytest.approx(1.0, abs=1e-12)
     colours = [*(getattr(score, key) for key in COLOUR_FIGURES), score.flip]
     np.testing.assert_array_equal(colours, [0.0 if channels in (1, 3) else np.nan] * 5)
+
+
+def test_a_measure_is_one_entry(monkeypatch):
+    image, truth = pictures()
+    monkeypatch.setitem(MEASURES, "new", Measure("sssfit.measure.structure:ssim", "NEW"))
+    score = measure(image, truth, structure=True)
+    assert list(score.to_dict())[-3:] == ["ssim", "flip", "new"]
+    assert score.to_dict()["new"] == score.structure["new"] == score.ssim
+    assert score.to_dict()["flip"] == score.flip
+    assert measure(image, truth).to_dict()["new"] is None
 
 
 def test_a_mask_gives_the_figures_of_the_cropped_picture():

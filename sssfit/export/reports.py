@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from sssfit.messages import Columns, Part, by_channel, counted, report
+from sssfit.methods import MEASURES
 
 _FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
@@ -114,7 +115,8 @@ _RENDERED: tuple[Part, ...] = (
     ("no_colour", "  no Delta E: {no_colour}"),
     ("rmse", "  relative L2 {relative_l2:.3g%|inf %}, RMSE {rmse:.3g}, largest {maximum:.3g}, PSNR "
      "{psnr_db:.1f|inf} dB"),
-    ("ssim", "  SSIM {ssim:.4f}, FLIP {flip:.4f}"),
+    (next(iter(MEASURES)), "  " + ", ".join(f"{each.summary} {{{name}:.4f}}" for name, each in
+     MEASURES.items())),
     ("rmse", Columns("channel", "channels", (
         ("energy drift", "energy_drift", "+.2g%|inf %"),
         ("radial asymmetry", "radial_asymmetry", ".3g"),

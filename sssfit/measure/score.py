@@ -1,11 +1,13 @@
 """Errors of a rendered picture compared with the true one: energy, visible colour, structure.
 
 RMSE, relative L2, maximum, PSNR and energy drift are computed from linear light. CIE Delta E 2000,
-SSIM and FLIP are computed from the displayed picture, at a stated exposure. `structure` has the
-last two, which need the extra ``metrics``; `asymmetry` and `cost` are measures of a kernel alone.
+SSIM and FLIP are computed from the displayed picture, at a stated exposure. The last two are those
+of ``sssfit.methods.MEASURES``, and need the extra ``metrics``; `asymmetry` and `cost` are measures
+of a kernel alone.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ from sssfit.measure.delta_e import (
     selected_pixels,
     selection,
 )
+from sssfit.methods import MEASURES
 
 __all__ = ["COLOUR_FIGURES", "ImageScore", "auto_exposure", "measure"]
 
@@ -33,7 +36,7 @@ COLOUR_FIGURES = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "
 SCORE_FIGURES = (
     *("rmse", "relative_l2", "maximum", "psnr_db", "energy_drift"),
     *COLOUR_FIGURES,
-    *("exposure", "ssim", "flip"),
+    *("exposure", *MEASURES),
 )
 
 
@@ -61,8 +64,8 @@ class ImageScore(ReadOnly):
         NaN without colour.
     exposure : float [1 / as the pictures]
         Factor applied to both pictures before they were clipped to [0, 1].
-    ssim, flip : float, optional [1]
-        See ``sssfit.measure.structure``; None unless requested.
+    structure : mapping of str to float [1]
+        Those of ``sssfit.methods.MEASURES`` by their names; empty unless requested.
     """
 
     rmse: float
@@ -75,17 +78,28 @@ class ImageScore(ReadOnly):
     delta_e_2000_p99: float
     share_above_1: float
     exposure: float
-    ssim: float | None = None
-    flip: float | None = None
+    structure: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         drift = np.array(self.energy_drift, dtype=np.float64)
         drift.setflags(write=False)
         object.__setattr__(self, "energy_drift", drift)
 
+    @property
+    def ssim(self) -> float | None:
+        """Structural similarity, `sssfit.measure.structure.ssim`; None unless requested."""
+        return self.structure.get("ssim")
+
+    @property
+    def flip(self) -> float | None:
+        """LDR-FLIP, `sssfit.measure.structure.flip`; None unless requested."""
+        return self.structure.get("flip")
+
     def to_dict(self) -> dict[str, Any]:
         """Return all figures in the order and with the names of ``sssfit render --json``."""
-        return plain({key: getattr(self, key) for key in SCORE_FIGURES})
+        own = [key for key in SCORE_FIGURES if key not in MEASURES]
+        measured = dict.fromkeys(MEASURES) | dict(self.structure)
+        return plain({**{key: getattr(self, key) for key in own}, **measured})
 
 
 def measure(
@@ -141,7 +155,7 @@ def measure(
         energy_drift=_ratio(pixels.sum(axis=0) - true.sum(axis=0), true.sum(axis=0)),
         **_colour_differences(pixels, true, exposure),
         exposure=exposure,
-        **(_structure(*pictures, exposure, mask) if structure else {}),
+        structure=_structure(*pictures, exposure, mask) if structure else {},
     )
 
 
@@ -190,11 +204,11 @@ def _colour_differences(pixels: FloatArray, true: FloatArray, exposure: float) -
 def _structure(
     image: FloatArray, truth: FloatArray, exposure: float, mask: npt.ArrayLike | None
 ) -> dict[str, float]:
-    """Return SSIM and FLIP of whole pictures."""
-    from sssfit.measure.structure import flip, ssim
-
-    coloured = image.shape[2] in (1, 3)
+    """Return the figures of ``MEASURES`` of whole pictures."""
+    is_coloured = image.shape[2] in (1, 3)
     return {
-        "ssim": ssim(image, truth, exposure, mask=mask),
-        "flip": flip(image, truth, exposure, mask=mask) if coloured else np.nan,
+        name: float(each.load()(image, truth, exposure, mask=mask))
+        if is_coloured or not each.of_colours
+        else np.nan
+        for name, each in MEASURES.items()
     }
