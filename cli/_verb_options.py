@@ -4,6 +4,8 @@ Those of methods and of made pictures are made from their entries, in ``_options
 """
 
 from sssfit import methods
+from sssfit.formats._picture_files import ENDINGS, READ
+from sssfit.messages import one_of
 from sssfit.methods import EXPORTS, FITS, LIGHTS, PRESETS, RENDERERS, SAVINGS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
@@ -29,7 +31,14 @@ from ._options import (
 MAPS = ("signed", "absolute")
 _FACTOR = NumberRange(min=0.0, min_open=True)
 _ANGLE = NumberRange(0.0, 180.0, min_open=True, max_open=True)
-_FILE = f"{', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA"
+_FILE = f"{', '.join(MADE)}, or your own {READ}"
+
+
+def _views_with(setting: str) -> str:
+    """Return the flags of the charts that take a setting: "--spectrum or --guide"."""
+    flagged = {name: each for name, each in methods.VIEWS.items() if each.flag}
+    return one_of([f"--{name}" for name, each in flagged.items() if setting in each.takes])
+
 
 # fmt: off
 _FIGURE = option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on "
@@ -64,8 +73,9 @@ RENDER = (
            "that the kernel was fitted to]"),
     option("--exposure", _FACTOR, "FACTOR", "Exposure for Delta E and PNG files.  [default: from "
            "the true picture]"),
-    flag("--structure", 'Also SSIM and FLIP (needs "sssfit[metrics]").'),
-    option("-o --output", None, "FILE", "Output file, .exr, .tif or .png (16 bits, sRGB); - for "
+    flag("--structure", f"Also {' and '.join(each.summary for each in methods.MEASURES.values())} "
+         '(needs "sssfit[metrics]").'),
+    option("-o --output", None, "FILE", f"Output file, {ENDINGS} (16 bits, sRGB); - for "
            "EXR on stdout.  [default: KERNEL.PICTURE.exr]"),
     option("--truth", None, "FILE", "Write the true picture as well."),
     option("--difference", None, "FILE", "Write the absolute difference as well."),
@@ -132,16 +142,16 @@ CHOOSE = (
 
 CHART = (
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Pixels of the kernel, with "
-           "--spectrum or --guide; profile is the width of the profile's first annulus.  "
+           f"{_views_with('mm_per_pixel')}; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
-    option("--k ks", Numbers(), "0..4,...", "One to four values, with --guide.  "
+    option("--k ks", Numbers(), "0..4,...", f"One to four values, with {_views_with('ks')}.  "
            "[default: 0,1.55,4]"),
     option("--channel", None, "NAME", "Channel to draw, with --guide or of a kernel.  [default: "
            "the first that returns light; of a kernel up to three]"),
     option("--profile", None, "FILE", "Profile that a kernel was fitted to.  [default: found "
            "beside it or here, by its hash]"),
-    option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
-           "[default: 1e7]"),
+    option("--photons", Count(2, 10**12), "N", "Photons of the walk, with "
+           f"{_views_with('photons')}.  [default: 1e7]"),
 )
 
 FIT_PIXELS = (
@@ -216,7 +226,7 @@ SCENE = (
     flag("--table", "Measure the paper's Table 1 in place of a frame."),
     option("--chart", None, "FILE", "With --table: figure, PNG, SVG or PDF by its ending; - for "
            "PNG on stdout."),
-    option("-o --output", None, "FILE", "Picture with the savings, .exr, .tif or .png; - for EXR "
+    option("-o --output", None, "FILE", f"Picture with the savings, {ENDINGS}; - for EXR "
            "on stdout.  [default: none]"),
     flag("--force", "Replace a file that is not our chart or picture."),
 )

@@ -20,6 +20,7 @@ from typing import Any, BinaryIO
 
 from sssfit.errors import ArgumentError, FileError, SssfitError
 from sssfit.messages import shown
+from sssfit.methods import EXPORTS
 
 if sys.platform == "win32":
     import msvcrt
@@ -223,7 +224,7 @@ def _is_among(path: Path, inputs: Iterable[str | Path]) -> bool:
 # Endings that promise a format; a name without one of them promises nothing.
 _DATA = (".csv", ".json", ".mci", ".mco", ".md", ".npz", ".toml")
 _PICTURES = (".exr", ".hdr", ".jpeg", ".jpg", ".pdf", ".png", ".svg", ".tif", ".tiff")
-_SHADERS = (".glsl", ".hlsl", ".wgsl")
+_OF_KERNELS = tuple(f".{name}" for name, each in EXPORTS.items() if not each.of_profiles)
 
 
 def check_ending(path: Path, what: str, own: str) -> None:
@@ -244,7 +245,7 @@ def check_ending(path: Path, what: str, own: str) -> None:
         The name has the ending of another format.
     """
     ending = path.suffix.lower()
-    if ending != own and ending in (*_DATA, *_PICTURES, *_SHADERS):
+    if ending != own and ending in (*_DATA, *_PICTURES, *_OF_KERNELS):
         raise FileError(f"{path} ends in {ending}, and {what} is written; end its name in {own}.")
 
 

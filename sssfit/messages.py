@@ -152,6 +152,12 @@ class _Template(Formatter):
         return number(value, form) if form else str(value)
 
 
+def one_of(words: Sequence[str]) -> str:
+    """Return words as a choice: "EXR, TIFF or PNG"."""
+    *others, last = words
+    return f"{', '.join(others)} or {last}" if others else last
+
+
 def filled(template: str, figures: Mapping[str, Any]) -> str:
     """Fill a template from a record's figures: "{width} pixels, off by {relative_l2:.3g%|inf %}".
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from sssfit.errors import FileError, RenderError
 from sssfit.files import check_target, has_mark, path_of, reason
-from sssfit.messages import counted, printable, shown
+from sssfit.messages import counted, one_of, printable, shown
 
 if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageSpec
@@ -126,9 +126,15 @@ def _png_primaries(path: Path) -> tuple[float, ...] | None:
     return found
 
 
-# Formats that are written, by ending.
-_ENDINGS = {".exr": "exr", ".tif": "tiff", ".tiff": "tiff", ".png": "png"}
-FORMATS = ("exr", "tiff", "png")
+# Formats that are written: in words, and their endings.
+_WRITTEN = {
+    "exr": ("EXR", ".exr"),
+    "tiff": ("TIFF", ".tif", ".tiff"),
+    "png": ("16-bit PNG", ".png"),
+}
+FORMATS = tuple(_WRITTEN)
+ENDINGS = one_of([endings[0] for _, *endings in _WRITTEN.values()])
+_ENDINGS = {each: name for name, (_, *endings) in _WRITTEN.items() for each in endings}
 _PNG = b"\x89PNG\r\n\x1a\n"
 # Formats that are read, by first bytes, so a wrong ending does no harm. TIFF has two byte orders,
 # and a variant for more than 4 GB.
@@ -139,7 +145,7 @@ _MAGIC = {
     "png": (_PNG,),
     "jpeg": (b"\xff\xd8\xff",),
 }
-READ = "EXR, HDR, TIFF, PNG, JPG or TGA"
+READ = one_of([*("JPG" if name == "jpeg" else name.upper() for name in _MAGIC), "TGA"])
 # A TGA file begins with no mark: the new form ends with one, the old needs its file ending.
 _TGA_END = b"TRUEVISION-XFILE.\0"
 _TGA_ENDINGS = (".tga", ".targa")
@@ -172,9 +178,9 @@ def image_format(target: str | Path | BinaryIO) -> str:
     if not isinstance(target, str | Path):
         raise FileError(f"a stream has no ending; name a format: {', '.join(FORMATS)}.")
     if (chosen := _ENDINGS.get(Path(target).suffix.lower())) is None:
+        kinds = one_of([words for words, *_ in _WRITTEN.values()])
         raise FileError(
-            f"{called(Path(target))}: pictures are written as EXR, TIFF or 16-bit PNG; end it in "
-            ".exr, .tif or .png."
+            f"{called(Path(target))}: pictures are written as {kinds}; end it in {ENDINGS}."
         )
     return chosen
 
