@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sssfit.export.numbers import literal
+import numpy as np
+
 from sssfit.files import has_mark
 from sssfit.messages import printable
 
@@ -220,6 +221,19 @@ C = Dialect(
     number="{value}f",
 )
 DIALECTS = {each.name: each for each in (HLSL, GLSL, WGSL, C)}
+
+
+def literal(value: float) -> str:
+    """Return a single-precision literal in as few digits as are read back to the same bits.
+
+    Subnormal numbers become 0, as on GPUs.
+    """
+    single = np.float32(value)
+    if abs(single) < np.finfo(np.float32).tiny:
+        return "0.0"
+    text = np.format_float_scientific(single, trim="0", exp_digits=1)
+    plain = np.format_float_positional(single, trim="0")
+    return plain if len(plain) <= len(text) else text
 
 
 def switch(prefix: str, feature: str) -> str:

@@ -10,8 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from sssfit.errors import KernelError
-from sssfit.export.dialects import KINDS, Dialect, switch
-from sssfit.export.numbers import literal
+from sssfit.export.dialects import KINDS, Dialect, literal, switch
 from sssfit.export.passes import Pass
 from sssfit.kernel import Taps
 
