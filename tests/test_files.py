@@ -136,7 +136,7 @@ ASKED = ("--from-reflectance", ".4,.3,.2", "--mean-free-path", "1", "--eta", "1.
         (("import", "t.csv", "--quantity", "energy", "-o", "x.json"), ".npz"),
         (("materials", *ASKED, "-o", "x.json"), ".toml"),
         (("fit", "t.profile.npz", "--method", "preintegrated", "-o", "x.npz"), ".json"),
-        (("choose", "skin1", "--distance", "1m", "-o", "x.hlsl"), ".json"),
+        (("choose", "skin1", "--distance", "1m", "-o", "x.c"), ".json"),
         (("export", "t.profile.npz", "--format", "csv", "-o", "x.json"), ".csv"),
         (("export", "t.kernel.json", "--format", "hlsl", "-o", "x.json"), ".hlsl"),
         (("export", "t.kernel.json", "--format", "json", "-o", "x.hlsl"), ".json"),

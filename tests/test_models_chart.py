@@ -14,6 +14,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import StepPatch
 from turns import mostly_slow
 
+from sssfit.chart import models
 from sssfit.chart.models import models_figure
 from sssfit.chart.page import save_figure
 from sssfit.chart.profile import profile_figure
@@ -181,6 +182,12 @@ def test_methods_differ_in_colour_and_dashes(figure):
     lines = [each for each in figure.axes[0].lines if len(each.get_xdata()) > 2]
     assert len({to_hex(each.get_color()) for each in lines}) == 4
     assert len({str(each._dash_pattern) for each in lines}) == 4
+
+
+def test_a_model_without_a_line_of_its_own_is_drawn(skin1, monkeypatch):
+    monkeypatch.delitem(models._STYLES, "burley")
+    drawn = models_figure(skin1)
+    assert "#666666" in {to_hex(each.get_color()) for each in drawn.axes[0].lines}
 
 
 def test_the_legend_gives_totals_and_errors(skin1, figure):

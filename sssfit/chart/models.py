@@ -111,10 +111,10 @@ def _table(
 
 def _handle(method: str) -> Handle:
     """Return the line of a method, for the walk with its band."""
-    line = Line2D([], [], **_STYLES[method])
+    line = Line2D([], [], **_style(method))
     if method != "montecarlo":
         return line
-    return Patch(facecolor=_STYLES[method]["color"], alpha=_BAND_ALPHA, lw=0), line
+    return Patch(facecolor=_style(method)["color"], alpha=_BAND_ALPHA, lw=0), line
 
 
 def _draw_densities(axes: Axes, comparison: ModelComparison, channel: int) -> None:
@@ -149,7 +149,7 @@ def _draw_curve(
     axes: Axes, curve: ModelCurve, edges_mm: FloatArray, mean: FloatArray, error: FloatArray
 ) -> None:
     """Draw a line through the middles of the bins; the walk as steps with a band."""
-    style = _STYLES[curve.method]
+    style = _style(curve.method)
     if edges_mm.size < 2:
         return  # the walk has too few photons; the title says so
     if curve.method != "montecarlo":
@@ -253,3 +253,8 @@ def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
             "approximation; the exact solution and the walk follow g itself."
         )
     return [*notes, *left_out_note(comparison.material.n_channels - len(shown))]
+
+
+def _style(method: str) -> Style:
+    """Return a method's line; grey dots for a model without one of its own."""
+    return _STYLES.get(method, {"color": "#666666", "linestyle": (0, (1, 2)), "lw": 1.2})
