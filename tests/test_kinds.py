@@ -72,7 +72,7 @@ def test_what_is_foreign_is_refused_by_its_name():
 
 def test_an_empty_name_is_called_one():
     for read in (load, load_mci, load_plan):
-        with pytest.raises(SssfitError, match="the name '' is empty; name an? "):
+        with pytest.raises(SssfitError, match=r"the name '' is empty; name an? "):
             read("")
 
 
