@@ -8,6 +8,7 @@ of a kernel alone.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,7 @@ class ImageScore(ReadOnly):
         drift = np.array(self.energy_drift, dtype=np.float64)
         drift.setflags(write=False)
         object.__setattr__(self, "energy_drift", drift)
+        object.__setattr__(self, "structure", MappingProxyType(dict(self.structure)))
 
     @property
     def ssim(self) -> float | None:

@@ -31,8 +31,7 @@ def load_plan(path: str | Path, *, seed: int | None = None) -> Plan:
     PlanError
         The file cannot be read, or it or a point is invalid; the message begins with its name.
     """
-    path = path_of(path, PlanError)
-    origin = printable(str(path))
+    folder, origin = path_of(path, PlanError).parent, printable(str(path))
     if origin == "-":
         raise PlanError(
             "- is stdin, and what a plan names lies in the plan's own folder; give the path of a "
@@ -44,7 +43,7 @@ def load_plan(path: str | Path, *, seed: int | None = None) -> Plan:
     except (ValueError, RecursionError) as error:
         raise PlanError(f"{origin}: not valid TOML: {printable(str(error))}.") from None
     try:
-        plan = _plan_of(content | ({} if seed is None else {"seed": seed}), path.parent)
+        plan = _plan_of(content | ({} if seed is None else {"seed": seed}), folder)
         _ = plan.grid  # which checks all points
     except SssfitError as error:
         raise PlanError(f"{origin}: {error}") from None
