@@ -89,8 +89,8 @@ RENDERERS: Mapping[str, Look] = {
     "variates": Look("adaptive, control variates", PURPLE, "o", LINE_STYLES[1]),
     "ahead": Look("adaptive, next frame's light", BLUE, "o", LINE_STYLES[2]),
     "fixed": Look("fixed sampling", ORANGE, "o"),
-    "separable": Look("separable", GREEN, "^", LINE_STYLES[1]),
-    "cascade": Look("cascade", BLACK, "*", LINE_STYLES[2]),
+    "separable": Look("separable kernel", GREEN, "^", LINE_STYLES[1]),
+    "cascade": Look("cascade of taps", BLACK, "*", LINE_STYLES[2]),
 }
 # Of what has no entry, each in turn; these are Tol's, too.
 _SPARE_COLOURS = ("#332288", "#117733", "#cc6677")
