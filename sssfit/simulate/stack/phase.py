@@ -185,6 +185,6 @@ def _conserving(
     """
     back = slab.sigma_s * henyey_greenstein(-directions.cosine, slab.g)
     missing = sigma_s - 2.0 * math.pi * float(directions.weight @ (ahead + back))
-    if slab.g < 0.0:
+    if slab.g < 0.0 < slab.sigma_s:
         return ahead, back * (1.0 + missing / (2.0 * math.pi * float(directions.weight @ back)))
     return ahead + missing / (2.0 * math.pi * float(np.sum(directions.weight))), back
