@@ -155,7 +155,8 @@ def test_the_table_has_the_papers_cells_and_says_so_where_it_has_none(kernel):
     ]
     np.testing.assert_allclose(found.over_screen[1], ratio)
     figure = figure_of(found)
-    assert [axes.get_title(loc="left") for axes in figure.axes][2] == "texture over screen space"
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles[2] == "(c) texture over screen space"
 
 
 def test_screen_space_is_near_texture_space_where_the_surface_faces_the_eye(kernel):
