@@ -33,7 +33,6 @@ from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._spectrum import Pictures, pictures_of, recorded, search_targets
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of, support_of
 from sssfit.fit._tied_chain import one_shape
-from sssfit.fit._trust_region import Minimum, minimise
 from sssfit.fit.structures import best_structure, width_pixels
 from sssfit.kernel.structure import Shape, cost_of_chain, parse, text_of
 from sssfit.kernel.taps import Stage, Taps
@@ -324,8 +323,7 @@ def searched(
         found.append(descent(few, x, 40))
         best = min(best, found[-1], key=lambda each: each.fun)
     best = descent(many, best.x, 200, gain=1e-5)
-    evaluations = sum(each.nfev for each in rough) + sum(each.nfev for each in (*found, best))
-    return best.x, evaluations
+    return best.x, sum(each.nfev for each in (*rough, *found, best))
 
 
 def _of_one_shape(chain: Chain, seed: int) -> list[FloatArray]:
@@ -356,18 +354,29 @@ def _rough(chain: Searched, x: FloatArray) -> optimize.OptimizeResult:
     )
 
 
-def descent(chain: Searched, x: FloatArray, most: int, gain: float = 3e-3) -> Minimum:
+def descent(
+    chain: Searched, x: FloatArray, most: int, gain: float = 3e-3
+) -> optimize.OptimizeResult:
     """Minimise from a point by a trust region with the Gauss-Newton matrix.
 
     It ends when ten steps together gain less than ``gain`` of the value.
     """
     values: list[float] = []
 
-    def has_ended(value: float) -> bool:
-        values.append(value)
-        return len(values) > 10 and values[-11] - values[-1] < gain * values[-1]
+    def check(intermediate_result: optimize.OptimizeResult) -> None:
+        values.append(intermediate_result.fun)
+        if len(values) > 10 and values[-11] - values[-1] < gain * values[-1]:
+            raise StopIteration
 
-    return minimise(chain.value_and_gradient, chain.hessian, x, most=most, has_ended=has_ended)
+    return optimize.minimize(
+        chain.value_and_gradient,
+        x,
+        jac=True,
+        hess=chain.hessian,
+        method="trust-ncg",
+        callback=check,
+        options={"maxiter": most, "gtol": 1e-14},
+    )
 
 
 def numbers_of(taps: Taps, lit: list[int], mm_per_pixel: float) -> Numbers:
