@@ -54,6 +54,13 @@ def is_number(value: object) -> TypeGuard[float]:
     return True
 
 
+def true_or_false(name: str, value: object, error: type[SssfitError]) -> bool:
+    """Return a truth value of Python or numpy, or raise ``error``: a text or a number is none."""
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{name} = {shown(value)}; expected True or False.")
+    return bool(value)
+
+
 def is_whole(value: object) -> bool:
     """Return whether a value is a whole number of Python or numpy; True and 2.0 are not."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)

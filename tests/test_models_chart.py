@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import StepPatch
 from turns import mostly_slow
 
-from sssfit.chart import models
+from sssfit.chart import looks
 from sssfit.chart.models import models_figure
 from sssfit.chart.page import save_figure
 from sssfit.chart.profile import profile_figure
@@ -184,10 +184,15 @@ def test_methods_differ_in_colour_and_dashes(figure):
     assert len({str(each._dash_pattern) for each in lines}) == 4
 
 
-def test_a_model_without_a_line_of_its_own_is_drawn(skin1, monkeypatch):
-    monkeypatch.delitem(models._STYLES, "burley")
+def test_models_without_a_look_of_their_own_are_drawn_and_told_apart(skin1, figure, monkeypatch):
+    monkeypatch.delitem(looks.MODELS, "burley")
+    monkeypatch.delitem(looks.MODELS, "dipole")
     drawn = models_figure(skin1)
-    assert "#666666" in {to_hex(each.get_color()) for each in drawn.axes[0].lines}
+    ours, spares = (
+        {to_hex(line.get_color()) for line in each.axes[0].lines} for each in (figure, drawn)
+    )
+    assert len(spares) == len(ours)
+    assert len(spares - ours) == 2
 
 
 def test_the_legend_gives_totals_and_errors(skin1, figure):

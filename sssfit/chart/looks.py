@@ -13,7 +13,7 @@ from typing import Any
 from matplotlib.colors import to_hex, to_rgb
 
 from sssfit.chart.page import COLOURS, LINE_STYLES, SHADES, Style
-from sssfit.methods import FITS
+from sssfit.methods import FITS, SIMULATIONS
 
 Marker = str | tuple[int, int, int]
 VERMILLION, GREEN, BLUE = COLOURS
@@ -104,9 +104,18 @@ _VARIANT_MARKERS = "os^DvPph8"
 
 def look(method: str) -> Look:
     """Return a fit's look; a spare one with its own name if it has none."""
-    if method in METHODS:
-        return METHODS[method]
-    others = [each for each in FITS if each not in METHODS]
+    return _look(method, METHODS, FITS)
+
+
+def model_look(method: str) -> Look:
+    """Return the look of what simulates a profile; a spare one if it has none."""
+    return _look(method, MODELS, SIMULATIONS)
+
+
+def _look(method: str, looks: Mapping[str, Look], known: Iterable[str]) -> Look:
+    if method in looks:
+        return looks[method]
+    others = [each for each in known if each not in looks]
     return spare(method, others.index(method) if method in others else len(others))
 
 

@@ -23,7 +23,7 @@ from matplotlib.ticker import (
 )
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.looks import MODELS
+from sssfit.chart.looks import model_look
 from sssfit.chart.page import (
     Handle,
     Style,
@@ -57,9 +57,6 @@ _TICKS_PERCENT = (-100, -10, 0, 10, 100, 1000)
 _MINUS = "\N{MINUS SIGN}"
 
 _WIDTHS = {"exact": 1.3, "montecarlo": 0.8, "burley": 1.5}  # points; of the others 1.2
-_STYLES: dict[str, Style] = {
-    name: each.stroke(_WIDTHS.get(name, 1.2)) for name, each in MODELS.items()
-}
 _BAND_ALPHA = 0.45
 
 
@@ -256,5 +253,4 @@ def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
 
 
 def _style(method: str) -> Style:
-    """Return a method's line; grey dots for a model without one of its own."""
-    return _STYLES.get(method, {"color": "#666666", "linestyle": (0, (1, 2)), "lw": 1.2})
+    return model_look(method).stroke(_WIDTHS.get(method, 1.2))

@@ -16,9 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
-from sssfit.arrays import check_kinds, check_settings
+from sssfit.arrays import check_kinds, check_settings, true_or_false
 from sssfit.errors import FitError
 from sssfit.fit._result import FitResult, TapsFit
 from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
@@ -114,8 +112,7 @@ def fit_result(
     if not isinstance(method, str) or method not in FITS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(FITS)}.")
     check_kinds(FITS[method], settings | {"taps": taps}, FitError)
-    if not isinstance(smooth, bool | np.bool_):
-        raise FitError(f"smooth = {shown(smooth)}; expected True or False.")
+    true_or_false("smooth", smooth, FitError)
     if place is not None and taps is None:
         raise FitError(f"place = {shown(place)} is where taps lie; give their number as `taps`.")
     if smooth:

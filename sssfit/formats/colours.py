@@ -192,13 +192,6 @@ def names_for(count: int, given: object, what: str) -> tuple[str, ...]:
     return names
 
 
-def true_or_false(value: object, what: str) -> bool:
-    """Return a truth value; a text or a number is none."""
-    if not isinstance(value, bool | np.bool_):
-        raise RenderError(f"{what} = {shown(value)}; expected True or False.")
-    return bool(value)
-
-
 def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -> tuple[str, ...]:
     """Check the shape and return a name for each channel."""
     if light.ndim != 3 or 0 in light.shape:

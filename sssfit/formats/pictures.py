@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly
+from sssfit.arrays import FloatArray, ReadOnly, true_or_false
 from sssfit.errors import FileError, RenderError
 from sssfit.files import check_target, reason, temporary_folder, write_atomically
 from sssfit.formats._picture_files import (
@@ -49,7 +49,6 @@ from sssfit.formats.colours import (
     positive,
     srgb_decode,
     srgb_encode,
-    true_or_false,
 )
 from sssfit.messages import printable, shown
 from sssfit.text import finite_number
@@ -413,7 +412,9 @@ class Image(ReadOnly):
             raise RenderError(f"name = {shown(self.name)}; expected a text.")
         kept = {
             "channels": names_for(self.pixels.shape[2], self.channels, "channels"),
-            "alpha_is_multiplied": true_or_false(self.alpha_is_multiplied, "alpha_is_multiplied"),
+            "alpha_is_multiplied": true_or_false(
+                "alpha_is_multiplied", self.alpha_is_multiplied, RenderError
+            ),
         }
         if self.mm_per_pixel is not None:
             kept["mm_per_pixel"] = positive(self.mm_per_pixel, "mm_per_pixel")
@@ -543,7 +544,7 @@ def save_image(
     if not isinstance(chosen, str) or chosen not in FORMATS:
         raise FileError(f"format {shown(chosen)}: pictures are written as {', '.join(FORMATS)}.")
     light = as_light(pixels, "the picture")
-    alpha_is_multiplied = true_or_false(alpha_is_multiplied, "alpha_is_multiplied")
+    alpha_is_multiplied = true_or_false("alpha_is_multiplied", alpha_is_multiplied, RenderError)
     exposure = positive(exposure, "exposure")
     pitch = None if mm_per_pixel is None else positive(mm_per_pixel, "mm_per_pixel")
     names = channel_names(light, channels, chosen)

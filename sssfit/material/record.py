@@ -32,7 +32,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, ReadOnly, check_names
+from sssfit.arrays import FloatArray, ReadOnly, check_names, true_or_false
 from sssfit.errors import MaterialError
 from sssfit.material.checks import (
     DENSE_PER_MM,
@@ -354,8 +354,7 @@ def material_names(*, paper: bool = False, layered: bool = False) -> tuple[str, 
     materials of several layers and the slabs in their place.
     """
     for word, value in (("paper", paper), ("layered", layered)):
-        if not isinstance(value, bool | np.bool_):
-            raise MaterialError(f"{word} = {shown(value)}; expected True or False.")
+        true_or_false(word, value, MaterialError)
     if paper:
         return _PAPER
     return _names_in("layered" if layered else ".")

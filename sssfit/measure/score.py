@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly, plain
-from sssfit.formats.colours import true_or_false
+from sssfit.arrays import FloatArray, ReadOnly, plain, true_or_false
+from sssfit.errors import RenderError
 from sssfit.measure.delta_e import (
     auto_exposure,
     check_exposure,
@@ -143,7 +143,7 @@ def measure(
     >>> score.maximum, score.energy_drift.tolist(), round(score.psnr_db, 2)
     (0.25, [-0.25], 9.03)
     """
-    structure = true_or_false(structure, "structure")
+    structure = true_or_false("structure", structure, RenderError)
     pictures = check_pair(image, truth)
     selected = selection(mask, pictures[1])
     pixels, true = (selected_pixels(picture, selected) for picture in pictures)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, ReadOnly, check_label, is_whole
+from sssfit.arrays import FloatArray, ReadOnly, check_label, is_whole, true_or_false
 from sssfit.errors import RenderError
-from sssfit.formats.colours import as_light, names_for, positive, true_or_false
+from sssfit.formats.colours import as_light, names_for, positive
 from sssfit.messages import counted, printable, shown
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class Scene(ReadOnly):
         multiplied = f"{self.name}: alpha_is_multiplied"
         fields: dict[str, Any] = {
             "mm_per_pixel": positive(self.mm_per_pixel, f"{self.name}: mm_per_pixel"),
-            "alpha_is_multiplied": true_or_false(self.alpha_is_multiplied, multiplied),
+            "alpha_is_multiplied": true_or_false(multiplied, self.alpha_is_multiplied, RenderError),
         }
         if self.distance_mm is not None:
             fields["distance_mm"] = positive(self.distance_mm, f"{self.name}: distance_mm")
