@@ -51,16 +51,19 @@ class Row:
     ``command`` lacks the option. ``given`` sets it to a value other than its default; where it
     begins with the verb, it is a whole command. ``seen`` of that run has to equal ``library``, and
     has to differ from ``seen`` without the option. ``default`` is the documented default as it
-    would be typed: giving it changes nothing. ``words`` is how the help describes the default where
-    it does not name a value.
+    would be typed, or a function that finds it: giving it changes nothing. ``words`` is how the help
+    describes the default where it does not name a value.
     """
 
     command: str
     given: str
     seen: Callable[[Ran], Any]
     library: Callable[[], Any]
-    default: str = ""
+    default: str | Callable[[], str] = ""
     words: str = ""
+
+    def typed_default(self) -> str:
+        return self.default if isinstance(self.default, str) else self.default()
 
 
 # What is looked at
@@ -577,7 +580,7 @@ RENDER = {
         "--exposure 3",
         _FIGURES,
         lambda: _measured(exposure=3.0),
-        default=repr(auto_exposure(render_reference(_scene("disk"), profile()))),
+        default=lambda: repr(auto_exposure(render_reference(_scene("disk"), profile()))),
         words="from the true picture",
     ),
     "--structure": Row(

@@ -115,7 +115,8 @@ def test_defaults_in_the_help_are_those_of_the_table(verb, option):
 @pytest.mark.parametrize(("verb", "option"), DEFAULTS)
 def test_a_default_given_is_a_default_left_out(verb, option):
     row = ROWS[verb][option]
-    left_out, given = world.run(row.command), world.run(f"{row.command} {option} {row.default}")
+    default = row.typed_default()
+    left_out, given = world.run(row.command), world.run(f"{row.command} {option} {default}")
     assert given.status == 0, given.stdout + given.stderr
     assert same(row.seen(given), row.seen(left_out))
 
