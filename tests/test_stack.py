@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -343,6 +344,17 @@ def test_the_error_covers_a_finer_answer():
     assert (apart[1:] <= coarse.cumulative_stderr[1:] + fine.cumulative_stderr[1:]).all()
     assert fine.meta["relative_error"] <= 2e-4
     assert coarse.meta["settings"]["directions"] < fine.meta["settings"]["directions"]
+
+
+def test_the_error_of_a_half_space_covers_its_directions_in_azimuth(monkeypatch):
+    forward = medium(2.0, 30.0, 1.4, g=0.7)
+    found = simulate_exact(forward, tolerance=3e-5)
+    real = profiles.quarter_of
+    monkeypatch.setattr(profiles, "quarter_of", lambda *given: replace(real(*given), count=9))
+    fine = simulate_exact(forward, tolerance=3e-5)
+    apart = np.abs(found.cumulative - fine.cumulative)[:, 0]
+    worst = int(apart.argmax())
+    assert 0.0 < apart[worst] <= found.cumulative_stderr[worst, 0]
 
 
 def test_light_that_nothing_scatters_goes_by_lambert_and_fresnel():

@@ -78,11 +78,6 @@ class Family:
         return tuple(zip(_weights(slowest / k), (k, 2.0 * k, 4.0 * k), strict=False))
 
     @property
-    def has_layers(self) -> bool:
-        """Whether any layer ends, so that light comes back through it."""
-        return any(math.isfinite(slab.thickness) for each in self.stacks for slab in each.slabs)
-
-    @property
     def scatters_back(self) -> bool:
         """Whether any layer scatters light back rather than ahead."""
         return any(slab.g < 0.0 for slab in self._scattering)
