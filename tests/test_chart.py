@@ -331,6 +331,15 @@ def test_numbers_read_as_people_write_them():
     assert shortened("near-infrared-940nm") == "near-…-940nm"
 
 
+def test_names_that_are_shortened_alike_have_their_numbers():
+    names = ["left cheek 850 nm day", "R", "left cheek 940 nm day"]
+    assert [channel_name(names, k) for k in range(3)] == [
+        "left …nm day (1)",
+        "R",
+        "left …nm day (3)",
+    ]
+
+
 def test_right_to_left_names_stand_before_their_figures():
     assert drawable("R  0.4 ± 0.1, $x") == r"R  0.4 ± 0.1, \$x"
     names = ["\u05d0\u05d3 \u05d5", "\u0623\u062e", "\u05d1"]

@@ -10,6 +10,7 @@ from reference_pixels import make_profile
 import sssfit.chart
 from sssfit.chart import FIGURES, figure_of
 from sssfit.compare import compute_spectrum
+from sssfit.errors import ArgumentError
 from sssfit.material import load_material
 from sssfit.methods import imported
 
@@ -33,6 +34,13 @@ def test_the_registry_has_every_figure_of_the_room():
 def test_a_figure_takes_the_record_that_it_is_registered_for(kind):
     annotations = [str(each) for each in imported(FIGURES[kind]).__annotations__.values()]
     assert any(kind in each for each in annotations), annotations
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+@pytest.mark.parametrize("other", [None, "skin1", []], ids=repr)
+def test_a_figure_refuses_other_records(kind, other):
+    with pytest.raises(ArgumentError, match=f"is not drawn here; expected the record {kind}"):
+        imported(FIGURES[kind])(other)
 
 
 def test_a_record_is_drawn_by_what_it_is():

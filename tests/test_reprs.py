@@ -18,6 +18,7 @@ from sssfit.chart.page import save_figure
 from sssfit.chart.profile import profile_figure
 from sssfit.compare.kernel_view import view_kernel
 from sssfit.errors import KernelError
+from sssfit.export import exported
 from sssfit.simulate import simulate_burley, simulate_montecarlo
 
 NUMBER = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
@@ -139,6 +140,11 @@ def test_a_table_of_taps_has_a_row_for_each_channel(profile):
     assert isinstance(taps.plot(profile), Figure)
     with pytest.raises(KernelError, match="has the channels"):
         taps.plot(_grey())
+
+
+def test_an_exported_file_is_one_line_without_its_content(kernel):
+    made = exported([kernel], "csv")
+    assert repr(made) == f"<Exported a table (.csv) of a kernel, {len(made.content):,} bytes>"
 
 
 def _grey():

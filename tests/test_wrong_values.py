@@ -17,6 +17,7 @@ from sssfit.fit.disk import fit_disk
 from sssfit.formats.pictures import Image
 from sssfit.grid import RadialGrid
 from sssfit.kernel import Taps
+from sssfit.kernel.taps import Stage
 from sssfit.material import load_material
 from sssfit.measure.score import measure
 from sssfit.render.jitter import Jitter
@@ -37,6 +38,7 @@ WRONG = [
 PROFILE = one_over_r_profile(40, 0.1, [0.3, 0.5, 0.8])
 KERNEL = fit_preintegrated(PROFILE, mm_per_pixel=0.5).kernel
 TAPS = fit_disk(PROFILE, taps=4, mm_per_pixel=0.5).kernel
+PAIR = Stage(0, "pair", np.array([0.5]), np.full((2, 3), 0.25))
 LIGHT = np.ones((12, 12, 3))
 SCENE = make_scene("edge", height=4, width=4, mm_per_pixel=0.5)
 MATERIAL = load_material("skin1")
@@ -70,6 +72,11 @@ CALLS = {
     "quadrant_kernel": (PROFILE.quadrant_kernel, {"mm_per_pixel": 1.0, "channel": 0}),
     "line_kernel": (PROFILE.line_kernel, {"mm_per_pixel": 1.0, "half_pixels": 3}),
     "full": (KERNEL.full, {"channel": 0}),
+    "line": (
+        TAPS.stages[0].line,
+        {"offsets_mm": [0.5, 1.2], "weights": np.ones((2, 3)), "mm_per_texel": 0.5},
+    ),
+    "pass_weights": (PAIR.pass_weights, {"mm_per_texel": 0.5}),
     "bytes_per_pixel": (TAPS.bytes_per_pixel, {"texel": "half"}),
     "from_dict": (sssfit.Material.from_dict, {"content": MATERIAL.to_dict()}),
     "corner": (SCENE.corner, {"pixels": 2}),
@@ -136,6 +143,12 @@ def test_wrong_fields(record):
     for field in dataclasses.fields(record):
         for wrong in WRONG:
             refused(lambda **given: dataclasses.replace(record, **given), **{field.name: wrong})
+
+
+def test_passes_beyond_memory_are_refused():
+    """Texels of 1e-12 mm would make one of 8 TB."""
+    with pytest.raises(SssfitError, match="at most 1e\\+07 texels"):
+        PAIR.pass_weights(1e-12)
 
 
 def test_light_near_the_largest_number_is_summed_or_refused():

@@ -12,6 +12,7 @@ from sssfit.chart.page import (
     Style,
     add_legend,
     channel_style,
+    check_drawn,
     draw_curve,
     name_axes,
     new_page,
@@ -47,7 +48,13 @@ def angles_figure(found: AngularReflectance) -> Figure:
     -------
     matplotlib.figure.Figure
         8 x 4.4 inches; bands of one standard or estimated error.
+
+    Raises
+    ------
+    ArgumentError
+        ``found`` is another record.
     """
+    check_drawn(found, "AngularReflectance")
     profile = found.profile
     shown = in_legend(profile.n_channels)
     title = titled(profile, "light by exit angle")

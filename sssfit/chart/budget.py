@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from sssfit.chart.looks import BLUE, DASHED, GREEN, GREY, ORANGE, PURPLE, SKY, series
-from sssfit.chart.page import Style, drawable, name_axes, new_page, tick
+from sssfit.chart.page import Style, check_drawn, drawable, name_axes, new_page, tick
 from sssfit.chart.text import count, shortened
 from sssfit.kernel import Taps
 from sssfit.messages import counted
@@ -60,8 +60,14 @@ def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
         8 inches wide: a stacked bar for each picture, shares [%] of the squared error; under it,
         for each cause alone, Delta E 2000 on a logarithmic axis, or relative L2 [%] if the channels
         have no colour.
+
+    Raises
+    ------
+    ArgumentError
+        ``budgets`` is another record, or there is none.
     """
     given = list(budgets) if isinstance(budgets, Sequence) else [budgets]
+    check_drawn(given[0] if given else None, "Budget")
     shown, names = given[:_MOST_PICTURES], _names(given[0])
     bars, rows = _BAR_INCHES * len(shown), _ROW_INCHES * len(names)
     notes = [*_NOTES, *_left_out(given)]

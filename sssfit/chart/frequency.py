@@ -12,6 +12,7 @@ from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     add_legend,
     channel_style,
+    check_drawn,
     draw_curve,
     name_axes,
     new_page,
@@ -49,7 +50,13 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
     -------
     matplotlib.figure.Figure
         8 x 4.4 inches; bands of one standard or estimated error where it is known.
+
+    Raises
+    ------
+    ArgumentError
+        ``found`` is another record.
     """
+    check_drawn(found, "FrequencyResponse")
     profile = found.profile
     shown = in_legend(profile.n_channels)
     title = titled(profile, "response to sinusoids of light")

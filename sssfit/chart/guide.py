@@ -23,6 +23,7 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_table,
+    check_drawn,
     draw_plane,
     draw_steps,
     name_axes,
@@ -80,7 +81,13 @@ def guide_figure(guide: Guide) -> Figure:
         difference a a^T - R_d as a share of the channel's energy in each pixel, over mm: symmetric
         and logarithmic, one scale for all rows. a / sum(a) per mm over the distance from the
         middle, with the pre-integrated pass.
+
+    Raises
+    ------
+    ArgumentError
+        ``guide`` is another record.
     """
+    check_drawn(guide, "Guide")
     rows = _rows(guide)
     where = kernel_subtitle(guide.profile, guide.pixels, guide.mm_per_pixel)
     height = 2.05 + (_LINE_INCHES + _ROW_INCHES) * len(rows)

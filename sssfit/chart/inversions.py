@@ -12,6 +12,7 @@ from sssfit.chart.page import (
     LINE_STYLES,
     Style,
     add_legend,
+    check_drawn,
     name_axes,
     new_page,
     tick,
@@ -42,7 +43,13 @@ def inversions_figure(curves: InversionCurves) -> Figure:
     -------
     matplotlib.figure.Figure
         8 inches wide; 1 - albedo is the share that a collision absorbs.
+
+    Raises
+    ------
+    ArgumentError
+        ``curves`` is another record.
     """
+    check_drawn(curves, "InversionCurves")
     title = "From a colour to an albedo: the renderers' formula and the exact solver"
     lit = {"normal": "light along the normal", "diffuse": "light from all directions"}
     subtitle = f"half space, isotropic scattering, {lit[curves.light]}"

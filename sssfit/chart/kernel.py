@@ -33,6 +33,7 @@ from sssfit.chart.page import (
     Style,
     add_legend,
     add_table,
+    check_drawn,
     draw_plane,
     draw_steps,
     drawable,
@@ -72,7 +73,13 @@ def kernel_figure(view: KernelView) -> Figure:
         middle [mm], and a row: the profile's energy per area [1/mm^2] and the kernel's, their
         difference in each pixel as a share of the channel's energy, and both along the axis and the
         diagonal. Without a profile only the kernel is drawn.
+
+    Raises
+    ------
+    ArgumentError
+        ``view`` is another record.
     """
+    check_drawn(view, "KernelView")
     heads, rows = _table(view)
     labels = _term_labels(view)
     planes = _ROW_INCHES * len(rows) + 0.9  # with their colour bars

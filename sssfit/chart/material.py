@@ -13,13 +13,14 @@ from sssfit.chart.page import (
     SHADES,
     Style,
     add_legend,
+    check_drawn,
     drawable,
     name_axes,
     new_page,
     short_number,
     tick_decades,
 )
-from sssfit.chart.text import channel_names, shortened, spread
+from sssfit.chart.text import short_names, shortened, spread
 from sssfit.material import Layer, Material
 from sssfit.messages import counted
 
@@ -50,12 +51,18 @@ def material_figure(material: Material) -> Figure:
         8 inches wide, with a point per channel and layer, on logarithmic scales: sigma_a and the
         reduced sigma_s [1/mm], the reduced mean free path [mm], and 1 - albedo, the share that a
         collision absorbs, because albedos near 1 look alike and differ much in effect.
+
+    Raises
+    ------
+    ArgumentError
+        ``material`` is another record.
     """
+    check_drawn(material, "Material")
     matter = [k for k, layer in enumerate(material.layers) if not layer.is_clear]
     shown = [matter[k] for k in spread(len(matter), _MOST_LAYERS)]
     title = f"{shortened(material.name, 24)}: material"
     notes = _notes(material, shown)
-    names = [shortened(each) for each in channel_names(material.channels)]
+    names = short_names(material.channels)
     height = HEIGHT_INCHES + (0.07 * max(map(len, names)) if _are_upright(names) else 0.0)
     with new_page(height, title, _subtitle(material), notes) as (figure, below):
         count = len(names)

@@ -28,6 +28,7 @@ from sssfit.chart.page import (
     Handle,
     Style,
     add_table,
+    check_drawn,
     draw_steps,
     name_axes,
     new_page,
@@ -74,7 +75,13 @@ def models_figure(comparison: ModelComparison) -> Figure:
         8 x 6.6 inches, one column per channel: 2 pi r R_d [1/mm] over r [mm], and the relative
         error [%] below, linear to 10 % and logarithmic beyond; totals and their errors in the
         legend.
+
+    Raises
+    ------
+    ArgumentError
+        ``comparison`` is another record.
     """
+    check_drawn(comparison, "ModelComparison")
     shown = spread(comparison.material.n_channels, _MOST_COLUMNS)
     title, subtitle = _title(comparison), _subtitle(comparison)
     with new_page(HEIGHT_INCHES, title, subtitle, _notes(comparison, shown)) as (figure, below):

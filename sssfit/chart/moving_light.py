@@ -20,6 +20,7 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_legend,
+    check_drawn,
     name_axes,
     new_page,
     short_number,
@@ -56,7 +57,13 @@ def moving_light_figure(moving: MovingLight) -> Figure:
         8 x 9.9 inches: fetches a pixel, logarithmic, and error over the light's mean, logarithmic,
         over the frames, with the intensity of the light shaded behind; below, of every adaptive
         sampler, samples and moving variance in the last frame.
+
+    Raises
+    ------
+    ArgumentError
+        ``moving`` is another record.
     """
+    check_drawn(moving, "MovingLight")
     adaptive = [each for each in moving.tracks if each.variance is not None]
     title = f"{moving.material}, {moving.scene}: {moving.light} light"
     height = _HEIGHT_INCHES

@@ -41,7 +41,9 @@ from matplotlib.transforms import Bbox
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.files import MAKER, chart_format, known_format
+from sssfit.errors import ArgumentError
 from sssfit.files import check_target, write_atomically
+from sssfit.messages import shown
 from sssfit.profile import full_kernel
 
 Style = dict[str, Any]
@@ -115,6 +117,15 @@ class _Page(Figure):
         stream = io.BytesIO()
         save_figure(self, stream, format="png")
         return stream.getvalue()
+
+
+def check_drawn(record: object, kind: str) -> None:
+    """Raise ArgumentError unless a figure is asked for the record that it draws.
+
+    ``kind`` is the name of the record's class: the rooms of most records are not imported here.
+    """
+    if kind not in {each.__name__ for each in type(record).__mro__}:
+        raise ArgumentError(f"{shown(record)} is not drawn here; expected the record {kind}.")
 
 
 @contextlib.contextmanager

@@ -26,6 +26,7 @@ from sssfit.chart.page import (
     RC,
     Style,
     add_legend,
+    check_drawn,
     drawable,
     lay_out,
     name_axes,
@@ -86,9 +87,12 @@ def pareto_figure(
 
     Raises
     ------
+    ArgumentError
+        ``comparison`` is another record.
     RenderError
         Delta E is requested for other than 1 or 3 channels.
     """
+    check_drawn(comparison, "Comparison")
     from sssfit.compare.comparison import check_error
 
     check_error(error, comparison.profile.n_channels)

@@ -16,7 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.looks import RULE, series
-from sssfit.chart.page import Style, add_legend, label_minor, name_axes, new_page
+from sssfit.chart.page import Style, add_legend, check_drawn, label_minor, name_axes, new_page
 
 if TYPE_CHECKING:
     from sssfit.compare.presets import PresetComparison
@@ -42,7 +42,13 @@ def presets_figure(found: PresetComparison) -> Figure:
     -------
     matplotlib.figure.Figure
         8 inches wide; a row takes .09 inches and .075 more for each picture.
+
+    Raises
+    ------
+    ArgumentError
+        ``found`` is another record.
     """
+    check_drawn(found, "PresetComparison")
     names = [each.parameters.preset.name for each in found.rows]
     errors = np.array([each.p95 for each in found.rows])
     count = len(found.pictures)

@@ -17,6 +17,7 @@ from sssfit.chart.page import (
     Style,
     add_legend,
     channel_style,
+    check_drawn,
     draw_steps,
     lay_out,
     name_axes,
@@ -48,7 +49,13 @@ def profile_figure(profile: Profile) -> Figure:
         8 x 6 inches; 2 pi r R_d [1/mm] over r [mm], linear and logarithmic; R_d [1/mm^2] over r in
         mean free paths (in mm if the material is unknown); R_d(x, y) over mm, in colour for three
         channels, else the first channel in shades of grey.
+
+    Raises
+    ------
+    ArgumentError
+        ``profile`` is another record.
     """
+    check_drawn(profile, "Profile")
     bins = [merged(profile, channel) for channel in range(profile.n_channels)]
     shown = picture(profile, bins)
     notes = words.footnotes(profile, words.image_note(profile, shown))

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from sssfit.chart.page import (
     RC,
+    check_drawn,
     draw_bar,
     drawable,
     new_mosaic,
@@ -44,7 +45,13 @@ def sheet_figure(sheet: Sheet) -> Figure:
     matplotlib.figure.Figure
         8 inches wide; pictures in sRGB at the truth's exposure. Differences are in lightness (CIE
         L*), amplified ten times: red is too bright, blue too dark.
+
+    Raises
+    ------
+    ArgumentError
+        ``sheet`` is another record.
     """
+    check_drawn(sheet, "Sheet")
     wide, tall = 2.0 + _APART + _PAIRS_APART, 1.0 + _ROWS_APART
     width, height = wide * len(sheet.scenes) - _PAIRS_APART, tall * len(sheet.rows)
     inches = min(_ROOM_INCHES / width, _MOST_INCHES)

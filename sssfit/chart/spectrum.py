@@ -20,6 +20,7 @@ from sssfit.chart.page import (
     LINE_STYLES,
     Style,
     add_table,
+    check_drawn,
     name_axes,
     new_page,
     short_number,
@@ -56,7 +57,13 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
     matplotlib.figure.Figure
         8 x 4.4 inches: shares [%] of the sum of squares and of the sum of absolute values over the
         number of the term, logarithmic; hollow if the eigenvalue is negative.
+
+    Raises
+    ------
+    ArgumentError
+        ``spectrum`` is another record.
     """
+    check_drawn(spectrum, "Spectrum")
     shown = spread(spectrum.profile.n_channels, _MOST_CHANNELS)
     where = kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
     title = titled(spectrum.profile, "energy of the kernel's singular values")

@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.looks import RULE, series
-from sssfit.chart.page import Style, add_legend, name_axes, new_page, tick_decades
+from sssfit.chart.page import Style, add_legend, check_drawn, name_axes, new_page, tick_decades
 from sssfit.messages import counted
 
 if TYPE_CHECKING:
@@ -46,7 +46,13 @@ def speed_up_figure(table: SpeedUpTable) -> Figure:
     -------
     matplotlib.figure.Figure
         8 x 7.6 inches.
+
+    Raises
+    ------
+    ArgumentError
+        ``table`` is another record.
     """
+    check_drawn(table, "SpeedUpTable")
     frame = table.frames[0][0]
     height, width = frame.row.resolution
     where = (

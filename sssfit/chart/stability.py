@@ -23,6 +23,7 @@ from sssfit.chart.page import (
     WIDTH_INCHES,
     Style,
     add_legend,
+    check_drawn,
     name_axes,
     new_page,
     short_number,
@@ -58,7 +59,13 @@ def stability_figure(stability: Stability) -> Figure:
     matplotlib.figure.Figure
         8 inches wide, with more than 12 panels 16. Bars are where other seeds lie; a line leaves
         its panel at the top where a fit is refused.
+
+    Raises
+    ------
+    ArgumentError
+        ``stability`` is another record.
     """
+    check_drawn(stability, "Stability")
     panels = stability.panels
     shared = _shared(stability)
     styles = _styles(panels)

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from sssfit.chart.page import NOTE_COLOUR, RC, drawable, new_mosaic, new_page
+from sssfit.chart.page import NOTE_COLOUR, RC, check_drawn, drawable, new_mosaic, new_page
 from sssfit.chart.text import left_out_note, method_name, shortened, spread
 from sssfit.messages import counted
 
@@ -41,7 +41,13 @@ def swatches_figure(found: Swatches) -> Figure:
     matplotlib.figure.Figure
         8 inches wide; colours in sRGB under D65, a perfect white being #ffffff, with their codes.
         A swatch whose spectrum is not finished is crossed out.
+
+    Raises
+    ------
+    ArgumentError
+        ``found`` is another record.
     """
+    check_drawn(found, "Swatches")
     lengths = [len(each) for each in found.axes.values()]
     every = list(itertools.product(*map(range, lengths[:-1])))
     rows = [every[k] for k in spread(len(every), _MOST_ROWS)]

@@ -21,6 +21,7 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_legend,
+    check_drawn,
     drawable,
     name_axes,
     new_mosaic,
@@ -56,7 +57,13 @@ def taps_figure(view: TapsView) -> Figure:
         decades; below it, along the axis, what each stage adds in the channel that reaches
         farthest, and the sum of all channels beside the profile's kernel, where it is known. Stages
         that add nothing, whose light only later ones read, are not drawn.
+
+    Raises
+    ------
+    ArgumentError
+        ``view`` is another record.
     """
+    check_drawn(view, "TapsView")
     taps = view.taps
     shown = _shown_stages(view)
     pictures = len(shown) + (view.truth is not None)

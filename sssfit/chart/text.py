@@ -126,7 +126,13 @@ def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
 
 def channel_name(channels: Sequence[str], channel: int) -> str:
     """Return a channel's name as a chart shows it, short."""
-    return shortened(channel_names(channels)[channel])
+    return short_names(channels)[channel]
+
+
+def short_names(channels: Sequence[str]) -> list[str]:
+    """Return the channels' names, short; with their numbers where several come out the same."""
+    names = [shortened(each) for each in channel_names(channels)]
+    return [f"{name} ({k + 1})" if names.count(name) > 1 else name for k, name in enumerate(names)]
 
 
 def channel_names(channels: Sequence[str]) -> list[str]:

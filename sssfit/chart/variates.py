@@ -15,7 +15,16 @@ from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.looks import BLACK, ORANGE, PURPLE
-from sssfit.chart.page import COLOURS, LINE_STYLES, Style, add_table, name_axes, new_page, tick
+from sssfit.chart.page import (
+    COLOURS,
+    LINE_STYLES,
+    Style,
+    add_table,
+    check_drawn,
+    name_axes,
+    new_page,
+    tick,
+)
 from sssfit.messages import counted
 
 if TYPE_CHECKING:
@@ -56,7 +65,13 @@ def variates_figure(table: VariateTable) -> Figure:
     -------
     matplotlib.figure.Figure
         8 x 8.2 inches, with the table at the top.
+
+    Raises
+    ------
+    ArgumentError
+        ``table`` is another record.
     """
+    check_drawn(table, "VariateTable")
     title = "Control variates under light that changes"
     where = f"f = h(t) / (1 + y), g = h(t) (1 - y), 16 samples a frame, {_seeds(table)}"
     with new_page(_HEIGHT_INCHES, title, where, [_NOTE]) as (figure, below):

@@ -38,6 +38,10 @@ class Exported(NamedTuple):
     ending: str
     figures: dict[str, Any]  # those of ``sssfit export --json``
 
+    def __repr__(self) -> str:
+        size = f"{len(self.content):,} bytes"
+        return f"<Exported {self.what} ({self.tag}{self.ending}) of a {self.of}, {size}>"
+
     @property
     def stdout(self) -> str:
         """What goes to stdout, in words."""

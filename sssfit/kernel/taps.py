@@ -81,6 +81,7 @@ BYTES = {
     "srgb8": 4,
 }
 _IN_TEXEL = 3  # channels, beside coverage
+_MOST_TEXELS = 1e7  # of a pass to one side: 240 MB of three channels
 
 
 def textures_for(channels: int) -> int:
@@ -169,8 +170,14 @@ class Stage(ReadOnly):
         weights : array (n, C)
         mm_per_texel : float [mm]
             Size of a texel of the stage's own picture.
+
+        Raises
+        ------
+        KernelError
+            There are no offsets, the arrays differ in length or are not finite, an offset is below
+            0, or one reaches more than 10 million texels.
         """
-        texels = offsets_mm / mm_per_texel
+        texels, weights = _on_texels(offsets_mm, weights, mm_per_texel)
         whole = np.floor(texels)
         part = (texels - whole)[:, None]
         reach = int(whole.max()) + 1
@@ -181,10 +188,42 @@ class Stage(ReadOnly):
         return np.concatenate((half[:0:-1], half))
 
     def pass_weights(self, mm_per_texel: float) -> FloatArray:
-        """Return the pass of a pair on texels of its picture, (2m+1, C)."""
+        """Return the pass of a pair on texels of its picture, (2m+1, C).
+
+        Parameters
+        ----------
+        mm_per_texel : float [mm]
+
+        Raises
+        ------
+        KernelError
+            As of `line`.
+        """
         line = self.line(self.offsets_mm, self.weights[1:], mm_per_texel)
         line[len(line) // 2] += self.weights[0]
         return line
+
+
+def _on_texels(offsets_mm: object, weights: object, mm_per_texel: object) -> list[FloatArray]:
+    """Return offsets in texels (n,) and weights (n, C) of `Stage.line`, or raise KernelError."""
+    pitch_mm = number_array("mm_per_texel", mm_per_texel, KernelError)
+    if pitch_mm.shape != () or not 0.0 < pitch_mm < math.inf:
+        raise KernelError(f"mm_per_texel = {shown(mm_per_texel)}; expected a length above 0.")
+    offsets = number_array("offsets_mm", offsets_mm, KernelError)
+    shares = number_array("weights", weights, KernelError)
+    if offsets.ndim != 1 or shares.ndim != 2 or len(offsets) != len(shares) or not shares.size:
+        raise KernelError(
+            f"offsets_mm has shape {offsets.shape} and weights {shares.shape}; expected (n,) and "
+            "(n, channels)."
+        )
+    if not (np.isfinite(shares).all() and (offsets >= 0.0).all()):
+        raise KernelError("offsets_mm and weights must be finite, and offsets not below 0.")
+    if not offsets.max() <= _MOST_TEXELS * pitch_mm:
+        raise KernelError(
+            f"offsets_mm reaches {offsets.max():.3g} mm with texels of {pitch_mm:.3g} mm; expected "
+            f"at most {_MOST_TEXELS:g} texels."
+        )
+    return [offsets / pitch_mm, shares]
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
