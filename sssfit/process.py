@@ -1,4 +1,4 @@
-"""The process: its cores and threads, the memory it may use, its caches, Ctrl-C and SIGTERM.
+"""The process: its cores and threads, the memory it may use, its caches, its signals.
 
 Memory: under a limit (``ulimit -v``, a batch system's) compiled libraries do not raise MemoryError.
 At 400 MB scipy's BLAS tried forever to get its buffers, at 520 MB the process ended in a
@@ -6,9 +6,11 @@ segmentation fault. So the limit is compared with the measured needs of librarie
 
 Signals: the first requests an orderly end, the second ends the program at once. The first raises
 KeyboardInterrupt in the main thread, or is recorded if the work so far can be saved
-(`asked_to_stop`). Python code receives a signal only between two of its instructions, and the main
-thread may be inside compiled code for minutes. So a thread that waits at the pipe of Python's C
-handler handles the second signal; it removes temporary files and locks and ends the process with
+(`asked_to_stop`). A terminal that closes sends SIGHUP more than once, by its shell and again as the
+shell ends: the later ones count for nothing, or they would end what saves the work. Python code
+receives a signal only between two of its instructions, and the main thread may be inside compiled
+code for minutes. So a thread that waits at the pipe of Python's C handler handles the second
+signal; it removes temporary files and locks and ends the process with
 130. If even that thread cannot run, because compiled code holds Python's global lock, the kernel
 ends the process: with glibc a signal's handler works for one signal until the thread renews it
 (System V semantics).
@@ -268,6 +270,7 @@ def is_out_of_memory(error: BaseException | None) -> bool:
 # Signals
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_FIRST = (*_SIGNALS, *([] if sys.platform == "win32" else [signal.SIGHUP]))
 _STATUS = 130
 _STDERR = 2
 _SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
@@ -289,13 +292,13 @@ class Interrupts:
         self._thread_hook = threading.excepthook
 
     def take(self) -> None:
-        """Handle SIGINT and SIGTERM from here on, unless they are ignored (``nohup``, ``&``)."""
+        """Handle these signals from here on, unless they are ignored (``nohup``, ``&``)."""
         _heard.clear()
         reader, self._writer = os.pipe()
         if sys.platform != "win32":
             os.set_blocking(self._writer, False)
         self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
-        for number in _SIGNALS:
+        for number in _FIRST:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 self._before[number] = signal.signal(number, _raise)
         sys.excepthook, sys.unraisablehook = self._uncaught, self._unraisable
@@ -336,7 +339,7 @@ class Interrupts:
 
 @contextlib.contextmanager
 def asked_to_stop() -> Iterator[Callable[[], bool]]:
-    """Yield a function that tells whether SIGINT or SIGTERM has arrived since.
+    """Yield a function that tells whether SIGINT, SIGTERM or SIGHUP has arrived since.
 
     After the first signal the former handlers stand again. Under `nothing_to_save` it raises
     KeyboardInterrupt.
@@ -357,7 +360,7 @@ def asked_to_stop() -> Iterator[Callable[[], bool]]:
         if _nothing_to_save.is_set():
             _interrupt(frame)
 
-    for number in _SIGNALS:
+    for number in _FIRST:
         if signal.getsignal(number) is not signal.SIG_IGN:
             before[number] = signal.signal(number, note)
     if _listening.is_set():

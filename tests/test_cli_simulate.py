@@ -246,13 +246,13 @@ def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
 
 
 @posix
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_interrupted_runs_save_what_is_done(tmp_path, number):
     simulate_montecarlo(load_material("skin1"), photons=1000)  # compiled before, if not yet
     process = start(tmp_path, "skin1", "--photons", "1e11", "--json", "--checkpoint-every", "0")
     saved = tmp_path / "skin1.profile.npz.checkpoint"  # as soon as there is a batch
     wait_for(lambda: saved.exists() or process.poll() is not None)
-    process.send_signal(number)
+    process.send_signal(getattr(signal, number))
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Interrupted: the photons traced so far are saved" in err

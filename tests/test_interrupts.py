@@ -120,6 +120,25 @@ def test_ctrl_c_and_then_sigterm_end_it_as_well(tmp_path):
     assert end_of(process, within=1.0)[0] == 130
 
 
+def test_a_terminal_that_closes_ends_it_once(tmp_path):
+    """Its shell sends SIGHUP, and the kernel again as the shell ends, while work is being saved."""
+    body = """
+        import time
+        try:
+            click.echo("ready")
+            time.sleep(60)
+        finally:
+            time.sleep(0.5)
+            Path("saved").touch()
+    """
+    process = start_trial(body, tmp_path)
+    for _ in range(3):
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.1)
+    assert end_of(process) == (130, "\nInterrupted.\n")
+    assert (tmp_path / "saved").exists()
+
+
 WRITING = """
 import threading
 from sssfit import files

@@ -137,6 +137,33 @@ def test_no_worker_outlives_its_caller(tmp_path, number):
     assert waited_for(lambda: not any(map(is_alive, pids)))
 
 
+_CLOSED = """
+import os, signal, sys
+from functools import partial
+from multiprocessing.resource_tracker import _resource_tracker as tracker
+sys.path[:0] = {paths!r}
+from sssfit.stability.workers import Workers
+from worker_calls import scaled
+
+if __name__ == "__main__":
+    with Workers(1, None) as workers:
+        pid = workers.each(partial(scaled, 1), [1])[0][2]
+        for each in (pid, tracker._pid):
+            os.kill(each, signal.SIGHUP)
+        assert workers.each(partial(scaled, 1), [1])[0][2] == pid
+        assert tracker._check_alive()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="SIGHUP")
+def test_a_terminal_that_closes_leaves_workers_to_their_caller(tmp_path):
+    """It sends SIGHUP to all of them, and to Python's tracker, which printed a traceback."""
+    script = tmp_path / "closed.py"
+    script.write_text(_CLOSED.format(paths=[str(Path(__file__).parent)]))
+    _, errors = (caller := start([sys.executable, str(script)])).communicate(timeout=60.0)
+    assert (caller.returncode, errors) == (0, "")
+
+
 _FAILING = """
 import sys
 sys.path[:0] = {paths!r}

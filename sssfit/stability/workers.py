@@ -189,18 +189,22 @@ def _start_tracker() -> None:
     if sys.platform != "win32":
         sys.warnoptions.append("ignore:resource_tracker:UserWarning")
         try:
-            ensure_running()
+            with _deaf():
+                ensure_running()
         finally:
             sys.warnoptions.pop()
 
 
 @contextlib.contextmanager
 def _deaf() -> Iterator[None]:
-    """Start processes that do not hear Ctrl-C, which would end their imports with a traceback."""
+    """Start processes that hear neither Ctrl-C nor a terminal that closes.
+
+    Those go to all processes of the terminal, and the caller ends the others in order.
+    """
     if sys.platform == "win32":
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     try:
         yield
     finally:
@@ -215,7 +219,8 @@ def _begin(theirs: Connection, name: str) -> None:
     kept.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform != "win32":
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGHUP})
     threading.Thread(target=_end_with_caller, args=(theirs,), daemon=True).start()
     warnings.simplefilter("ignore")  # as in the caller: what fits warn of is what a stress finds
     one_blas_thread().__enter__()
