@@ -1,8 +1,10 @@
 """Sequences under light that changes: what control variates save, beside other renderers."""
 
 import dataclasses
+import errno
 import json
 import math
+import os
 
 import numpy as np
 import pytest
@@ -353,6 +355,19 @@ def test_frames_in_the_other_format_stay_and_are_told_of(skin1, scenes, tmp_path
 def test_frames_go_into_a_folder_with_a_name(skin1, name):
     with pytest.raises(ArgumentError, match=f"`frames` is '{name}'; expected the name of a folder"):
         run_sequence(skin1, "dot", frames=name)
+
+
+def test_a_full_disk_is_told_by_the_name_of_the_frame(skin1, scenes, tmp_path, monkeypatch):
+    def full(_handle):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    files = FrameFiles(tmp_path / "new", "variates", make_frames(skin1, scenes["edge"], length=2))
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(FileError) as caught, files.held():
+        files.write("variates", 1, np.zeros((4, 4, 3)))
+    path = tmp_path / "new" / "frame-0001.png"
+    assert str(caught.value) == f"{path} cannot be written: no space left on device."
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("stops", [KeyboardInterrupt, FileError])

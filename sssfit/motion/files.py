@@ -116,14 +116,20 @@ class FrameFiles:
 
     def write(self, name: str, frame: int, picture: FloatArray) -> None:
         """Write a frame, if it is of the renderer that was asked for."""
-        if name == self._name:
+        if name != self._name:
+            return
+        path = self.paths[frame]
+        aside = self._aside / path.name
+        try:
             save_image(
-                self._aside / self.paths[frame].name,
+                aside,
                 picture,
                 channels=self._channels,
                 exposure=self._exposure,
                 mm_per_pixel=self._frames.scene.mm_per_pixel,
             )
+        except FileError as error:  # of a full disk: the user knows nothing of the folder aside
+            raise FileError(str(error).replace(str(aside), str(path))) from None
 
 
 @contextlib.contextmanager
