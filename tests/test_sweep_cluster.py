@@ -1,6 +1,7 @@
 """A scheduler and two workers as processes of their own: the same bits, whatever is killed."""
 
 import contextlib
+import logging
 import os
 import signal
 import socket
@@ -111,8 +112,10 @@ def kill_a_client(machines, folder, path, seconds):
     process.wait()
 
 
-def test_what_is_killed_changes_no_bit(machines, plan, undisturbed, tmp_path):
+def test_what_is_killed_changes_no_bit(machines, plan, undisturbed, tmp_path, caplog, monkeypatch):
     """A client, then a worker, at last the scheduler; each time the sweep goes on to the end."""
+    for name in ("distributed", "distributed.client", "distributed.gc"):
+        monkeypatch.setattr(logging.getLogger(name), "handlers", [caplog.handler])
     path = tmp_path / "client.zarr"
     kill_a_client(machines, tmp_path, path, 0.3)
     found = sweep_to_store(plan, path, scheduler=machines.address, resume=True)
@@ -124,6 +127,9 @@ def test_what_is_killed_changes_no_bit(machines, plan, undisturbed, tmp_path):
     assert sweep_to_store(plan, path, scheduler=machines.address, progress=watch).is_complete
     assert machines.workers[0].wait(5) == -signal.SIGKILL
     assert content(path) == undisturbed
+
+    # Dask told of the result that it could not gather, in words that do not say what to do.
+    assert not [each for each in caplog.records if each.name.startswith("distributed")]
 
     path = tmp_path / "scheduler.zarr"
     watch = killing(machines.scheduler)

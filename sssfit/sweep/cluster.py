@@ -35,6 +35,9 @@ _CONNECT_SECONDS = 10.0
 _WORKERS_SECONDS = 30.0
 _MOST_LOCAL = 256
 _FILES = 50
+# Dask's loggers with a level of their own, which it sets as it is imported; and whose it uses.
+_DASKS = ("distributed", "distributed.client", "distributed.gc")
+_OTHERS = ("tornado", "tornado.application", "asyncio")
 _AHEAD = 3  # ranges of a walk for each worker
 _RANGE_STEPS, _MESSAGE_BYTES = 5e8, 8_000_000
 
@@ -63,7 +66,8 @@ class Connection:
         check_memory("cluster", None)
         check_open_files(_FILES + 8 * self._count)
         distributed = needed("distributed", "cluster")
-        with self._stack, _quiet():
+        with self._stack, _quiet(*_OTHERS):
+            self._stack.enter_context(_quiet(*_DASKS))
             address: Any = self._address
             if self._count:
                 address = self._stack.enter_context(local_workers(self._count))
@@ -79,7 +83,7 @@ class Connection:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        with _quiet():
+        with _quiet(*_OTHERS):
             self._stack.close()
 
     def call(self, work: Callable[..., _Found], *given: Any) -> "Future[_Found]":
@@ -220,9 +224,8 @@ def _hand_over(ended: Any, result: "Future[Any]") -> None:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep what Dask logs of lost connections out of stderr; what matters is raised."""
-    names = ("distributed", "tornado", "asyncio")
+def _quiet(*names: str) -> Iterator[None]:
+    """Keep what is logged of lost workers and connections out of stderr; what matters is raised."""
     before = {name: logging.getLogger(name).level for name in names}
     for name in names:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
