@@ -1,6 +1,7 @@
 """The group of all verbs; one is run, and every failure becomes one line.
 
-Exit status: 0 done, 1 a clear error, 2 wrong usage, 130 interrupted with what was done saved.
+Exit status: 0 done, 1 a clear error, 2 wrong usage, 130 interrupted with what was done saved,
+141 nobody reads the output any more.
 Nothing heavy is imported here or at the head of a verb's file, so ``--help`` answers at once; a
 verb imports the library in its body.
 """
@@ -94,8 +95,9 @@ def run(args: Sequence[str] | None) -> NoReturn:
         except (KeyboardInterrupt, click.Abort):
             click.echo("Interrupted.", err=True)
             sys.exit(130)
-        except BrokenPipeError:
-            _leave_quietly()
+        except SystemExit as end:  # of a verb, of completion, or click's 1: the reader has gone
+            is_gone = end.code == 1 and "_SSSFIT_COMPLETE" not in os.environ
+            sys.exit(141 if is_gone else end.code)  # as other tools end (sssfit ... | head)
         except Exception as error:
             if is_out_of_memory(error):
                 _fail("out of memory: use a smaller grid or picture, fewer channels or --threads.")
@@ -132,12 +134,6 @@ def _one_line(text: str) -> str:
     """Escape what would move the cursor or the line, and cut the middle out of what is too long."""
     line, half = printable(text), _LONGEST_LINE // 2
     return line if len(line) <= _LONGEST_LINE else f"{line[:half]} ... {line[-half:]}"
-
-
-def _leave_quietly() -> NoReturn:
-    """End when the reader of our output has gone (``sssfit ... | head``), as other tools do."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(141)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
