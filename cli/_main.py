@@ -6,6 +6,7 @@ Nothing heavy is imported here or at the head of a verb's file, so ``--help`` an
 verb imports the library in its body.
 """
 
+import errno
 import logging
 import os
 import sys
@@ -102,7 +103,9 @@ def run(args: Sequence[str] | None) -> NoReturn:
             if is_out_of_memory(error):
                 _fail("out of memory: use a smaller grid or picture, fewer channels or --threads.")
             if isinstance(error, OSError):
-                _fail(f"{error.filename or 'operating system'}: {reason(error)}.")
+                full = error.errno in (errno.ENOSPC, errno.EFBIG)  # a file has its name told
+                where = "stdout cannot be written" if full else "operating system"
+                _fail(f"{error.filename or where}: {reason(error)}.")
             if os.environ.get("SSSFIT_TRACEBACK"):
                 raise
             _fail(

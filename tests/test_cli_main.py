@@ -224,6 +224,16 @@ def test_reader_that_goes_away_is_no_error():
     assert process.returncode == 141
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+def test_a_full_disk_under_stdout_is_told_as_such():
+    with fork_server.start(trial("open('/dev/full', 'wb', 0).write(b'x')")) as process:
+        _, err = process.communicate(timeout=20)
+    assert (process.returncode, err) == (
+        1,
+        "Error: stdout cannot be written: no space left on device.\n",
+    )
+
+
 @posix_only
 def test_no_color_is_honoured_on_a_terminal(tmp_path):
     import pty
