@@ -51,8 +51,8 @@ class Row:
     ``command`` lacks the option. ``given`` sets it to a value other than its default; where it
     begins with the verb, it is a whole command. ``seen`` of that run has to equal ``library``, and
     has to differ from ``seen`` without the option. ``default`` is the documented default as it
-    would be typed, or a function that finds it: giving it changes nothing. ``words`` is how the help
-    describes the default where it does not name a value.
+    would be typed, or a function that finds it: giving it changes nothing. ``words`` is how the
+    help describes the default where it does not name a value.
     """
 
     command: str
