@@ -72,7 +72,8 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 class _Notes(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
-        click.echo(printable(in_options(record.getMessage())), err=True)
+        with contextlib.suppress(OSError):  # a note that nobody can read ends no run
+            click.echo(printable(in_options(record.getMessage())), err=True)
 
 
 @contextlib.contextmanager

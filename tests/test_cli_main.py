@@ -234,6 +234,20 @@ def test_a_full_disk_under_stdout_is_told_as_such():
     )
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+def test_notes_that_cannot_be_written_end_no_run():
+    body = """
+        import logging
+        from sssfit.cli._options import _notes_on_stderr
+        with _notes_on_stderr(quiet=False):
+            logging.getLogger("sssfit").info("using the newest")
+        click.echo("done")
+    """
+    with Path("/dev/full").open("wb") as full:
+        ended = fork_server.run(trial(body), stderr=full, timeout=20)
+    assert (ended.returncode, ended.stdout) == (0, "done\n")
+
+
 @posix_only
 def test_no_color_is_honoured_on_a_terminal(tmp_path):
     import pty
