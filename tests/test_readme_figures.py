@@ -144,12 +144,12 @@ def kernel_of(profile, half, samples=8):
     def energies(size, count):
         at = (np.arange((2 * size + 1) * count) + 0.5) / count - (size + 0.5)
         x = PITCH * at
-        r = np.hypot(x[:, None], x)
+        r = np.hypot(x[size * count :, None], x)  # the rows above are those below
         density = np.stack([slope(r) for slope in slopes], axis=-1) / (2.0 * np.pi * r[..., None])
         density[r < 0.5 * PITCH] = 0.0
-        pixels = 2 * size + 1
-        blocks = density.reshape(pixels, count, pixels, count, -1)
-        return blocks.sum(axis=(1, 3)) * (PITCH / count) ** 2
+        blocks = density.reshape(size + 1, count, 2 * size + 1, count, -1)
+        below = blocks.sum(axis=(1, 3)) * (PITCH / count) ** 2
+        return np.concatenate((below[:0:-1], below))
 
     kernel = energies(half, samples)
     near, fine = 4, energies(4, 180)

@@ -131,6 +131,7 @@ def refused(call, **given):
 @pytest.mark.parametrize("name", CALLS)
 def test_wrong_arguments(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sssfit.simulate._finished.DEFAULT_PHOTONS", 1000)  # 1e7 take 4 s
     call, good = CALLS[name]
     for key in good:
         answers = [refused(call, **(good | {key: wrong})) for wrong in WRONG]
