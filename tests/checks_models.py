@@ -30,11 +30,11 @@ DIFFUSE = {
 }
 BEYOND = {
     "slab, 2 mean free paths": stack(layer(0.01, 0.99, 0.0, 1.4, 2.0)),
-    "slab, albedo .9": stack(layer(0.1, 0.9, 0.0, 1.4, 5.0)),
-    "absorbing layer below": stack(
+    "slab of 5, albedo .9": stack(layer(0.1, 0.9, 0.0, 1.4, 5.0)),
+    "layer of albedo .7 below": stack(
         layer(0.01, 0.99, 0.0, 1.4, 5.0), layer(0.3, 0.7, 0.0, 1.4, 5.0)
     ),
-    "one slab cut in three": stack(*[layer(0.01, 0.99, 0.0, 1.4, 4.0)] * 3),
+    "one slab of 12, cut in three": stack(*[layer(0.01, 0.99, 0.0, 1.4, 4.0)] * 3),
 }
 
 

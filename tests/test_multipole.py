@@ -223,5 +223,11 @@ def test_the_figure_of_the_differences_can_be_drawn(tmp_path, monkeypatch):
     picture = tmp_path / "multipole.png"
     monkeypatch.setattr(sys, "argv", [str(script), "2e4", str(picture)])
     monkeypatch.setattr(sys, "path", list(sys.path))
-    runpy.run_path(str(script), run_name="__main__")
+    made = runpy.run_path(str(script), run_name="__main__")
     assert picture.read_bytes().startswith(b"\x89PNG")
+    *_, rule, first, second = made["table"](
+        20_000, {"slab": DIFFUSE["slab, 5 mean free paths"]}
+    ).splitlines()
+    assert first.startswith("| slab | R | 0.5")
+    assert second.startswith("|  | T | 0.2")
+    assert {line.count("|") for line in (rule, first, second)} == {13}
