@@ -15,9 +15,10 @@ PHOTONS = 10_000_000
 HEAD = """# The eleven materials
 
 Made by `python docs/make_materials.py`: 10,000,000 photons each, seed 1, the paper's grid (dr =
-shortest mean free path / 20, radius = 32 longest mean free paths), all cores. The diffuse
-reflectance is for a pencil beam at normal incidence; it includes the light beyond the grid and
-excludes specular reflection. The standard error is the run's own. Everything except the seconds
+shortest mean free path / 20, radius = 32 longest mean free paths), all cores. The transport mean
+free path is 1 / (sigma_a + (1 - g) sigma_s): here, where g is 0, 1 / (sigma_a + sigma_s). The
+diffuse reflectance is for a pencil beam at normal incidence; it includes the light beyond the grid
+and excludes specular reflection. The standard error is the run's own. Everything except the seconds
 is the same on every machine.
 
 For high albedo the paper's grid cuts off energy; `--radius auto` enlarges the grid until less
@@ -28,8 +29,8 @@ than 0.1 % of every channel lies beyond it.
 COLUMNS = (
     "material",
     "channel",
-    "albedo",
-    "mean free path (mm)",
+    "single-scattering albedo",
+    "transport mean free path (mm)",
     "diffuse reflectance",
     "std. error",
     "beyond grid (share of diffuse)",

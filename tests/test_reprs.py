@@ -78,12 +78,14 @@ def test_a_kernel_is_one_line_with_its_errors(kernel):
 
 def test_a_material_is_one_line(spectral):
     skin = sssfit.load_material("skin1")
-    expected = "<Material skin1: eta 1.3, mean free path R 1.3, G 0.952, B 0.671 mm>"
+    expected = "<Material skin1: eta 1.3, transport mean free path R 1.3, G 0.952, B 0.671 mm>"
     assert repr(skin) == expected
     layer = skin.layers[0]
     stack = sssfit.Material("s", ("R", "G", "B"), (replace(layer, thickness_mm=0.25), layer))
     assert repr(stack) == "<Material s: 2 layers of 0.25, inf mm>"
-    assert "2 mm thick, mean" in repr(replace(stack, layers=(replace(layer, thickness_mm=2.0),)))
+    assert "2 mm thick, transport mean" in repr(
+        replace(stack, layers=(replace(layer, thickness_mm=2.0),))
+    )
     assert repr(spectral).endswith(" and 60 more mm>")
 
 

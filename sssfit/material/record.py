@@ -199,7 +199,7 @@ class Material:
             bottom = (
                 "" if self.is_semi_infinite else f" {self.layers[0].thickness_mm:.3g} mm thick,"
             )
-            what = f"eta {self.layers[0].eta:g},{bottom} mean free path {paths}"
+            what = f"eta {self.layers[0].eta:g},{bottom} transport mean free path {paths}"
         return f"<Material {of_material(self.name)}: {what} mm>"
 
     def __eq__(self, other: object) -> bool:
@@ -228,8 +228,8 @@ class Material:
         """Fresnel reflectance at normal incidence of all interfaces above the first turbid layer.
 
         ((n1 - n0) / (n1 + n0))^2 for one; clear layers on top add theirs, including multiple
-        reflections: R = R1 + (1 - R1)^2 R2 / (1 - R1 R2) (Wang, Jacques, Zheng 1995, eq. 3.4 for
-        one such layer).
+        reflections: R = R1 + (1 - R1)^2 R2 / (1 - R1 R2), as MCML has it for one such layer (Wang,
+        Jacques, Zheng 1995).
         """
         total = 0.0
         above = self.eta_above
