@@ -21,8 +21,10 @@ from scipy.special import erf
 
 from sssfit._jit import pixel_energy, pixels
 from sssfit.errors import ProfileError
+from sssfit.material import load_material
 from sssfit.profile import full_kernel
 from sssfit.profile import pixels as integrals
+from sssfit.simulate import simulate_exact
 
 NOISY = make_profile(
     np.concatenate(([0.0], np.cumsum(np.random.default_rng(5).uniform(0.5, 1.5, 14)))),
@@ -134,6 +136,18 @@ def test_centre_pixel_of_a_one_over_r_profile():
     # The pure 1/r: c p 4 ln(1 + sqrt 2) with F(dr) = 2 pi c dr, 0.561 of F(dr).
     share = profile.quadrant_kernel(1.0, 0)[0, 0, 2] / profile.cumulative[1, 2]
     assert share == pytest.approx(4 * np.log(1 + np.sqrt(2)) / (2 * np.pi), rel=1e-3)
+
+
+def test_centre_pixel_of_skin1_is_as_its_docstring_says():
+    # Scattering more than once adds r log r to F ~ r, which parabolas do not follow.
+    skin = load_material("skin1")
+    profile, fine = simulate_exact(skin), simulate_exact(skin, dr_mm=0.002, radius_mm=0.4)
+    lacks = {2.0: (-0.0011, 0.0), 1.0: (0.0045, 0.0125), 0.5: (0.0105, 0.0275)}
+    for annuli, (least, most) in lacks.items():
+        pitch_mm = annuli * profile.r_edges_mm[1]
+        centre, true = (each.quadrant_kernel(pitch_mm, 0)[0, 0] for each in (profile, fine))
+        assert least < (1.0 - centre / true).min()
+        assert (1.0 - centre / true).max() < most
 
 
 def test_pixels_near_the_beam_of_a_one_over_r_profile():
