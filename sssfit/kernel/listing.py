@@ -6,7 +6,8 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.messages import shown
 
-# The red channel of d'Eon's skin as the listing has it: weights and variances [mm^2].
+# The red channel of d'Eon's skin without its narrowest Gaussian, for which the strength stands:
+# weights and variances [mm^2].
 LISTED = ((0.1, 0.0484), (0.118, 0.187), (0.113, 0.567), (0.358, 1.99), (0.078, 7.41))
 
 

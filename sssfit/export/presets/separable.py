@@ -1,7 +1,8 @@
 """The kernel of separable-sss, which several engines take: width, strength and falloff.
 
 Jimenez' listing (``calculateKernel``; `sssfit.kernel.listing.listing`) evaluates the red channel
-of d'Eon's skin at a few offsets o, which grow as the square up to 3, or to 2 with 20 taps or fewer:
+of d'Eon's skin, without its narrowest Gaussian, for which the strength stands, at a few offsets o,
+which grow as the square up to 3, or to 2 with 20 taps or fewer:
 
     w(o) ~ area(o) p(o / (0.001 + f)),    p(r) = sum_i w_i exp(-r^2 / 2 v_i) / (2 pi v_i),
 
