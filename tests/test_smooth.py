@@ -11,6 +11,7 @@ from sssfit.fit import fit_result, fit_svd
 from sssfit.fit._target import Target
 from sssfit.material import load_material
 from sssfit.profile import smooth
+from sssfit.profile.directions import angular_reflectance
 from sssfit.profile.smooth import smoothed
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 
@@ -59,6 +60,14 @@ def test_each_channel_keeps_its_energy_and_its_annuli(exact):
     assert (found.annulus_energy >= 0.0).all()
     assert np.isnan(found.annulus_energy_stderr).all()
     assert fit_svd(found, rank=3, mm_per_pixel=PITCH).kernel.rank == 3
+
+
+def test_light_by_exit_angle_is_that_of_all_annuli_and_does_not_change():
+    own = simulate_montecarlo(load_material("skin1"), photons=2_000, angles=6)
+    before, after = (angular_reflectance(each) for each in (own, smoothed(own)))
+    assert after.profile.angle_reflected.shape == (1, 6, 3)
+    np.testing.assert_allclose(after.per_sr, before.per_sr, rtol=1e-12)
+    np.testing.assert_allclose(after.per_sr_stderr, before.per_sr_stderr, rtol=1e-9)
 
 
 def test_a_kernel_of_a_smoothed_profile_is_the_walks(exact):

@@ -189,6 +189,14 @@ def check_directions(fields: Mapping[str, Any]) -> None:
                 )
 
 
+def of_all_annuli(profile: Profile) -> dict[str, FloatArray]:
+    """Return the fields of reflected light by angle as one row, of all annuli; none without."""
+    if profile.angle_reflected is None:
+        return {}
+    energy, stderr = profile.angle_reflected.sum(axis=0), _stderr(profile, profile.angle_reflected)
+    return {"angle_reflected": energy[None], "angle_reflected_stderr": stderr[None]}
+
+
 def _angles_of(profile: Profile) -> tuple[FloatArray, FloatArray]:
     if profile.exit_angle_edges_rad is None or profile.angle_reflected is None:
         raise ProfileError(

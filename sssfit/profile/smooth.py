@@ -18,6 +18,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
+from sssfit.profile.directions import of_all_annuli
 from sssfit.profile.pixels import annulus_areas
 
 _PIECES, _DEGREE = 40, 3  # of four decades of radius: ten a decade
@@ -47,6 +48,7 @@ def smoothed(profile: Profile) -> Profile:
     -------
     Profile
         On the same annuli; its standard errors are unknown, because annuli share their noise now.
+        Light by exit angle is that of all annuli together.
         Its ``meta`` names the walk's fingerprint as ``smoothed_sha256``.
 
     Raises
@@ -73,9 +75,9 @@ def smoothed(profile: Profile) -> Profile:
     energy = np.stack(channels, axis=1)
     unknown = np.full(energy.shape, np.nan)
     meta = {**profile.meta, "smoothed_sha256": profile.sha256}
-    return dataclasses.replace(
-        profile, annulus_energy=energy, annulus_energy_stderr=unknown, meta=meta
-    )
+    # Energy by annulus and angle is not smoothed, so it would not add up to that of annuli.
+    fields = of_all_annuli(profile) | {"annulus_energy": energy, "annulus_energy_stderr": unknown}
+    return dataclasses.replace(profile, **fields, meta=meta)
 
 
 def _smooth(edges_mm: FloatArray, energy: FloatArray, variance: FloatArray) -> FloatArray:
