@@ -13,10 +13,10 @@ from test_profile import make_profile
 from sssfit.errors import ArgumentError, FitError, SssfitWarning
 from sssfit.fit import guided as fit_module
 from sssfit.fit._cascade_again import followed
-from sssfit.material import load_material
+from sssfit.material import Layer, Material, load_material
 from sssfit.methods import STRESSES
 from sssfit.shapes import gaussian_cdf
-from sssfit.simulate import simulate_exact
+from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.stability import (
     Curve,
     Panel,
@@ -293,6 +293,23 @@ def test_a_fit_that_takes_unequal_radii_for_equal_ones_is_found(profile, monkeyp
     assert (np.array(healthy[: imports._RATIOS.index(1.6) + 1]) < imports.LIMIT).all()
     assert broken[1] > imports.LIMIT
     assert len(broken) == 2
+
+
+def test_what_leaves_below_and_at_which_angle_is_no_subject_of_stresses(profile, monkeypatch):
+    """Rings are put together and radii cut, of reflected light alone."""
+    slab = Material("slab", ("R", "G", "B"), (Layer(1.3, 0.0, [0.1] * 3, [1.0] * 3, 2.0),))
+    walked = simulate_montecarlo(slab, photons=2_000, angles=4)
+    seen = []
+
+    def looked_at(subject):
+        seen.append(grid.gathered(subject.profile, 2, 100).n_annuli)
+        seen.append(imports._unequal(subject, 2.0).n_annuli)
+        return []
+
+    monkeypatch.setattr(imports, "stress", looked_at)
+    assert stability(walked, only=["imports"], threads=1).panels == ()
+    assert seen[0] == 50
+    assert seen[1] < 20
 
 
 def test_a_guided_search_that_stays_near_its_start_is_found(profile, monkeypatch):

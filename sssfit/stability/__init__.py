@@ -22,6 +22,7 @@ from sssfit.messages import did_you_mean, shown
 from sssfit.methods import STRESSES, TAPS
 from sssfit.process import one_blas_thread, thread_count
 from sssfit.profile import Profile
+from sssfit.profile.npz import DIRECTED, OPTIONAL
 from sssfit.stability.curve import Curve, Edge
 from sssfit.stability.panel import Finding, Panel
 from sssfit.stability.record import MARK, Stability
@@ -90,6 +91,9 @@ def stability(
     if not (math.isfinite(mm_per_pixel) and mm_per_pixel > 0.0):
         raise ArgumentError(f"`mm_per_pixel = {mm_per_pixel}`; expected a length above 0.")
     profile = source if isinstance(source, Profile) else simulate_exact(source)
+    # Kernels know neither what leaves below nor angles, and stresses make other annuli.
+    unseen: dict[str, Any] = dict.fromkeys((*OPTIONAL, *DIRECTED))
+    profile = dataclasses.replace(profile, **unseen)
     name = profile.material_name or "unknown"
     subject = Subject(name, profile, mm_per_pixel, seed, threads, is_whole)
     loaded = {each: STRESSES[each].load() for each in names}

@@ -66,10 +66,6 @@ def gathered(profile: Profile, together: int, annuli: int) -> Profile:
         annulus_energy_stderr=unknown,
         beyond_grid=profile.beyond_grid + profile.annulus_energy[annuli:].sum(axis=0),
         beyond_grid_stderr=np.full(profile.n_channels, np.nan),
-        annulus_transmittance=None,
-        beyond_grid_transmittance=None,
-        annulus_transmittance_stderr=None,
-        beyond_grid_transmittance_stderr=None,
     )
 
 

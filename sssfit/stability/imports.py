@@ -6,14 +6,12 @@ the kernel's picture is compared with that of the whole profile's kernel.
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.methods import TAPS
 from sssfit.profile import Profile
-from sssfit.profile.npz import DIRECTED
 from sssfit.profile.pixels import annulus_areas
 from sssfit.stability.curve import Axis, Curve
 from sssfit.stability.panel import Panel
@@ -88,10 +86,7 @@ def _panel(
 
 def _with_energy(profile: Profile, energy: FloatArray) -> Profile:
     unknown = np.full(energy.shape, np.nan)
-    only: dict[str, Any] = dict.fromkeys(DIRECTED)  # of the annuli; angles are not imported
-    return dataclasses.replace(
-        profile, annulus_energy=energy, annulus_energy_stderr=unknown, **only
-    )
+    return dataclasses.replace(profile, annulus_energy=energy, annulus_energy_stderr=unknown)
 
 
 def _with_gaps(subject: Subject, share: float) -> Profile:
