@@ -105,7 +105,7 @@ def test_a_material_has_one_reflectance_a_channel(shape):
 
 
 def test_what_the_published_ones_really_reflect_is_a_literal_walks():
-    photons = 100_000
+    photons = 200_000
     for seed, found in enumerate(published_inversions([0.44, 0.23, 0.13], 1.3).values()):
         bins, squares, *_, roulette = reference.scalar_walk(
             seed, photons, found.albedo, np.ones(3), 1.3, 1.0, 1

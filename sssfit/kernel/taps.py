@@ -204,7 +204,9 @@ class Stage(ReadOnly):
         return line
 
 
-def _on_texels(offsets_mm: object, weights: object, mm_per_texel: object) -> list[FloatArray]:
+def _on_texels(
+    offsets_mm: object, weights: object, mm_per_texel: object
+) -> tuple[FloatArray, FloatArray]:
     """Return offsets in texels (n,) and weights (n, C) of `Stage.line`, or raise KernelError."""
     pitch_mm = number_array("mm_per_texel", mm_per_texel, KernelError)
     if pitch_mm.shape != () or not 0.0 < pitch_mm < math.inf:
@@ -223,7 +225,7 @@ def _on_texels(offsets_mm: object, weights: object, mm_per_texel: object) -> lis
             f"offsets_mm reaches {offsets.max():.3g} mm with texels of {pitch_mm:.3g} mm; expected "
             f"at most {_MOST_TEXELS:g} texels."
         )
-    return [offsets / pitch_mm, shares]
+    return offsets / pitch_mm, shares
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)

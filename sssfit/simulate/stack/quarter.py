@@ -3,9 +3,8 @@
 Light that crosses a layer of thickness d comes with a phase k d tan(theta) cos(phi), and what its
 bottom returns with twice that. In a layer of many optical depths little of it comes through; in one
 of .4, five directions a quarter leave an error of 6e-4 of F(r), which more polar directions keep,
-and in a half space up to 1e-5.
-So azimuths are chosen on their own: with few polar directions, the difference between two rules is
-the error of the smaller.
+and in a half space up to 1e-5. So azimuths are chosen on their own: with few polar directions, the
+difference between two rules is the error of the smaller.
 """
 
 import math
