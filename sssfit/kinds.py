@@ -50,6 +50,11 @@ class Kind:
     marks: tuple[bytes, ...] = ()
 
 
+def _in_json(family: str) -> tuple[bytes, ...]:
+    """Return the marks of a format in JSON, also as older shells of Windows pass on text."""
+    return tuple(f'"{family}/'.encode(each) for each in ("utf-8", "utf-16-le", "utf-16-be"))
+
+
 # The marks of archives are their first member's name, or the format in their JSON, which numpy
 # writes with four bytes a letter. Both stand uncompressed.
 KINDS: Mapping[str, Kind] = {
@@ -59,9 +64,13 @@ KINDS: Mapping[str, Kind] = {
         (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le")),
     ),
     "kernel": Kind(
-        "a kernel (.kernel.json)", "sssfit.kernel:SeparableKernel.read", (b'"sssfit.kernel/',)
+        "a kernel (.kernel.json)",
+        "sssfit.kernel:SeparableKernel.read",
+        _in_json("sssfit.kernel"),
     ),
-    "taps": Kind("a table of taps (.taps.json)", "sssfit.kernel:Taps.read", (b'"sssfit.taps/',)),
+    "taps": Kind(
+        "a table of taps (.taps.json)", "sssfit.kernel:Taps.read", _in_json("sssfit.taps")
+    ),
     "material": Kind("a material (.toml)", "sssfit.material:read_material"),
     "checkpoint": Kind(
         "a walk's checkpoint (.checkpoint)",

@@ -101,6 +101,8 @@ class Method:
     solves : str
         Of a simulation "transport", or "half spaces" or "layers" for a diffusion model of such,
         which is then compared with the exact solution wherever models are.
+    label : str
+        Name of a simulation in charts and reports.
     """
 
     function: str
@@ -112,6 +114,7 @@ class Method:
     is_seeded: bool = False
     makes: str | None = None
     solves: str = ""
+    label: str = ""
 
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
@@ -275,6 +278,7 @@ SIMULATIONS: Mapping[str, Method] = {
         ),
         shares=True,
         solves="transport",
+        label="Monte Carlo",
     ),
     "exact": Method(
         "sssfit.simulate:simulate_exact_many",
@@ -297,21 +301,25 @@ SIMULATIONS: Mapping[str, Method] = {
         ),
         shares=True,
         solves="transport",
+        label="Exact solution",
     ),
     "dipole": Method(
         "sssfit.simulate:simulate_dipole",
         "diffusion, Jensen et al. 2001; half spaces only",
         solves="half spaces",
+        label="Dipole",
     ),
     "dipole-grosjean": Method(
         "sssfit.simulate:simulate_dipole_grosjean",
         "the same with Grosjean's diffusion coefficient",
         solves="half spaces",
+        label="Dipole, Grosjean's D",
     ),
     "multipole": Method(
         "sssfit.simulate:simulate_multipole",
         "diffusion, Donner and Jensen 2005; also for slabs and layers",
         solves="layers",
+        label="Multipole",
     ),
     "burley": Method(
         "sssfit.simulate:simulate_burley",
@@ -328,11 +336,13 @@ SIMULATIONS: Mapping[str, Method] = {
             ),
         ),
         solves="half spaces",
+        label="Normalised diffusion",
     ),
     "gaussians": Method(
         "sssfit.simulate:simulate_deon_skin",
         "skin as the six Gaussians of d'Eon et al. 2007; deon-skin only",
         makes=DEON_SKIN,
+        label="Sum of Gaussians",
     ),
 }
 

@@ -49,7 +49,12 @@ def test_a_record_is_drawn_by_what_it_is():
     for each in (load_material("skin1"), profile, spectrum):
         assert isinstance(figure_of(each), Figure)
     assert isinstance(profile.plot(), Figure)
-    with pytest.raises(
-        TypeError, match="no chart of str; expected one of AngularReflectance, Budget, "
-    ):
-        figure_of("skin1")
+
+
+@pytest.mark.parametrize("other", [None, "skin1", [], ["skin1"]], ids=repr)
+def test_what_has_no_chart_is_refused_in_one_line(other):
+    with pytest.raises(ArgumentError) as caught:
+        figure_of(other)
+    said = f"there is no chart of {other!r}; expected one of AngularReflectance, Budget, "
+    assert str(caught.value).startswith(said)
+    assert "\n" not in str(caught.value)

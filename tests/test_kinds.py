@@ -42,6 +42,14 @@ def test_every_kind_is_told_by_what_it_holds(files, kind):
     assert len(summary(figures_of(found)).splitlines()) > 5
 
 
+@pytest.mark.parametrize("kind", ["kernel", "taps"])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_json_is_read_as_shells_and_editors_of_windows_pass_it_on(files, kind, encoding):
+    text = (files / kind).read_text("utf-8")
+    found = load(io.BytesIO(text.encode(encoding)))
+    assert figures_of(found) == figures_of(sssfit.load(files / kind))
+
+
 def test_a_stream_need_not_seek(files):
     class Pipe(io.RawIOBase):
         def __init__(self, content):

@@ -109,6 +109,8 @@ def test_every_simulation_says_what_it_solves_or_makes():
     for name, each in SIMULATIONS.items():
         assert bool(each.solves) != bool(each.makes)
         assert each.makes or name in known[each.solves]
+        assert each.label
+    assert len({each.label for each in SIMULATIONS.values()}) == len(SIMULATIONS)
     (model,) = [each for each in cli.commands["compare"].params if each.name == "model"]
     assert [*model.type.choices] == [*MODELS] == [*OF_HALF_SPACES, *OF_LAYERS]
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from sssfit.errors import ArgumentError
+from sssfit.messages import one_of, shown
 from sssfit.methods import VIEWS, imported
 
 if TYPE_CHECKING:
@@ -51,11 +53,12 @@ def figure_of(record: Any, **options: Any) -> Figure:
 
     Raises
     ------
-    TypeError
-        No chart is of such a record.
+    ArgumentError
+        There is no chart of such a record.
     """
-    kind = type(record[0] if isinstance(record, list) else record).__name__
+    kind = type(record[0] if isinstance(record, list) and record else record).__name__
     if kind not in FIGURES:
-        raise TypeError(f"no chart of {kind}; expected one of {', '.join(FIGURES)}.")
+        names = one_of([*FIGURES])
+        raise ArgumentError(f"there is no chart of {shown(record)}; expected one of {names}.")
     figure: Figure = imported(FIGURES[kind])(record, **options)
     return figure

@@ -11,21 +11,13 @@ from sssfit.arrays import FloatArray
 from sssfit.chart.data import Picture
 from sssfit.chart.page import has_letters_of
 from sssfit.messages import by_channel, counted, note, shown
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.profile.beam import parse_beam
 from sssfit.profile.bins import MIN_HITS
 
 NO_LIGHT = "returns no light"
 WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
-_METHODS = {
-    "montecarlo": "Monte Carlo",
-    "exact": "Exact solution",
-    "dipole": "Dipole",
-    "dipole-grosjean": "Dipole, Grosjean's D",
-    "multipole": "Multipole",
-    "burley": "Normalised diffusion",
-    "gaussians": "Sum of Gaussians",
-}
 _MOST_IN_LEGEND = 8
 _MOST_DECIMALS = 12
 _MOST_TOLD = 4  # names that a note repeats
@@ -90,8 +82,9 @@ def powered(words: str) -> str:
 
 
 def method_name(method: object) -> str:
-    """Return the displayed name of a method."""
-    return _METHODS.get(str(method), shortened(str(method)))
+    """Return the displayed name of a method of simulation; of one that is unknown its own."""
+    name = str(method)
+    return SIMULATIONS[name].label if name in SIMULATIONS else shortened(name)
 
 
 def grid(profile: Profile) -> str:

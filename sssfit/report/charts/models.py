@@ -4,16 +4,10 @@ import numpy as np
 from markupsafe import Markup
 
 from sssfit.compare.models import ModelComparison
+from sssfit.methods import SIMULATIONS
 from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import Report
 
-_NAMES = {
-    "exact": "exact solution",
-    "montecarlo": "photon walk",
-    "dipole": "dipole",
-    "dipole-grosjean": "dipole, Grosjean's D",
-    "burley": "normalised diffusion",
-}
 _FIRST = 1  # of three channels green is shown first, whose light goes neither far nor near
 
 
@@ -24,7 +18,7 @@ def models_chart(report: Report) -> Chart | None:
     names = report.profile.channels
     panels = [(name, _panel(report.models, k, name)) for k, name in enumerate(names)]
     every = enumerate(report.models.curves)
-    legend = tuple((f"m{k}", _NAMES.get(each.method, each.method)) for k, each in every)
+    legend = tuple((f"m{k}", SIMULATIONS[each.method].label) for k, each in every)
     note = "One channel at a time; curves end where the walk has fewer than 100 hits in an annulus."
     return Chart("models", "Models", note, legend, tuple(panels), min(_FIRST, len(names) - 1))
 
