@@ -285,9 +285,9 @@ def needed(monkeypatch, errors, *, walked=None, own_seed=5):
 
     def error_of(material, option, views, photons, seed):
         seeds.append(seed)
-        return next(left)
+        return next(left), 0.25
 
-    monkeypatch.setattr(photon_walks, "_error", error_of)
+    monkeypatch.setattr(photon_walks, "_error_and_seconds", error_of)
     meta = {"method": "exact"} if walked is None else {"method": "montecarlo", "seed": own_seed}
     profile = SimpleNamespace(photons=walked, meta=meta)
     views = SimpleNamespace(profile=profile, tolerance=0.5)
@@ -303,6 +303,24 @@ def test_photons_stop_at_the_tolerance_and_not_at_twice_it(monkeypatch):
     assert (found.photons, found.counts) == (10**5, (10**4, 10**5))
     found, _ = needed(monkeypatch, [3.0, 2.0, 1.0, 0.6])
     assert (found.photons, len(found.counts)) == (None, 4)
+
+
+def test_seconds_are_those_of_the_walks_alone(monkeypatch):
+    clock = [0.0]
+
+    def walk(*_, photons, **__):
+        clock[0] += photons / 1e4
+        return "walk"
+
+    def score(*_, **__):
+        clock[0] += 100.0  # a fit, and a picture of every view
+        return SimpleNamespace(error=0.7 if clock[0] < 150.0 else 0.3)
+
+    monkeypatch.setattr(photon_walks, "simulate_montecarlo", walk)
+    monkeypatch.setattr(photon_walks, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    profile = SimpleNamespace(photons=None, meta={}, r_edges_mm=np.array([0.0, 0.1]), n_annuli=1)
+    views = SimpleNamespace(profile=profile, tolerance=0.5, threads=1, score_of_option=score)
+    assert photons_needed("material", "option", views, 5, 0.0).seconds == (1.0, 10.0)
 
 
 def test_a_walk_is_not_held_against_a_part_of_itself(monkeypatch):

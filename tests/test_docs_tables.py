@@ -16,15 +16,19 @@ import pytest
 from checks_models import BEYOND, DIFFUSE, multipole_against_walk
 from edited_skin import compute_editing
 
-from sssfit.choose.choice import mm_per_pixel_at
+from sssfit.choose.choice import choose, mm_per_pixel_at
+from sssfit.choose.views import scene_for
 from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet
 from sssfit.compare.spectrum import compute_spectrum
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_preintegrated, fit_svd
 from sssfit.material import load_material, material_names
+from sssfit.measure.score import measure
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import full_kernel
+from sssfit.render.reference import render_reference
+from sssfit.render.taps import render_taps
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 from sssfit.simulate import (
     simulate_burley,
@@ -408,6 +412,32 @@ def test_figures_of_the_edits():
     made = runpy.run_path(str(ROOT / "docs" / "make_sheets.py"))
     page = (ROOT / "docs" / "how-to-choose.md").read_text(encoding="utf-8")
     assert made["editing_rows"](compute_editing()) in page, "run: python docs/make_sheets.py"
+
+
+@pytest.mark.slow
+def test_a_choice_for_the_head_is_none_for_edges_and_points():
+    material, pitch = load_material("chicken1"), mm_per_pixel_at(600.0, 30.0, 1080)
+    scenes = {name: scene_for(name, pitch, (1080, 1920)) for name in ("head", "edge", "points")}
+    choices = {
+        name: choose(material, mm_per_pixel=pitch, scene=each) for name, each in scenes.items()
+    }
+    head, edge, points = choices.values()
+
+    def p95(name):
+        truth = render_reference(scenes[name], head.profile)
+        return measure(render_taps(scenes[name], head.fit.kernel), truth).delta_e_2000_p95
+
+    stages = [each.fit.kernel.structure for each in choices.values()]
+    text = " ".join((ROOT / "docs" / "how-to-choose.md").read_text(encoding="utf-8").split())
+    assert (
+        f"takes {stages[0]}, whose 95th percentile is {head.chosen.error:.2f} on the head, but "
+        f"{p95('edge'):.1f} on an edge at 30 degrees and {p95('points'):.1f} on points."
+    ) in text
+    assert (
+        f"it takes {stages[1]} or {stages[2]}, for hardly more fetches "
+        f"({edge.chosen.fetches:.1f} and {points.chosen.fetches:.1f} in place of "
+        f"{head.chosen.fetches:.2f})"
+    ) in text
 
 
 @pytest.mark.parametrize(

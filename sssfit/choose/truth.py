@@ -123,7 +123,7 @@ class PhotonNeed:
         Error of the worst view by each, in the figure the tolerance is of; inf where the profile
         cannot be fitted.
     seconds : tuple of float [s]
-        What each took, compilation included.
+        What each walk took, compilation included; its fit and its pictures are not.
     truth_method : str
         How the profile that the choice was made on was found.
     truth_seconds : float [s]
@@ -167,9 +167,9 @@ def photons_needed(
     enough = walked
     counts = [each for each in COUNTS if walked is None or each < walked]
     for photons in counts:
-        begun = time.perf_counter()
-        errors.append(_error(material, option, views, photons, seed))
-        seconds.append(time.perf_counter() - begun)
+        error, took = _error_and_seconds(material, option, views, photons, seed)
+        errors.append(error)
+        seconds.append(took)
         if errors[-1] <= views.tolerance:
             enough = photons
             break
@@ -179,16 +179,20 @@ def photons_needed(
     )
 
 
-def _error(material: Material, option: Option, views: Views, photons: int, seed: int) -> float:
-    """Return the error of the worst view; what would be warned of is in it."""
+def _error_and_seconds(
+    material: Material, option: Option, views: Views, photons: int, seed: int
+) -> tuple[float, float]:
+    """Return the error of the worst view, and what the walk took; its warnings are in the error."""
     truth = views.profile
     radius_mm = radius_of(RadialGrid(float(truth.r_edges_mm[1]), truth.n_annuli))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SssfitWarning)
+        begun = time.perf_counter()
         walk = simulate_montecarlo(
             material, photons=photons, seed=seed, radius_mm=radius_mm, threads=views.threads
         )
+        took = time.perf_counter() - begun
         try:
-            return views.score_of_option(option, walk, wider=1.0).error
+            return views.score_of_option(option, walk, wider=1.0).error, took
         except FitError:  # a dark channel that no photon came back in
-            return float("inf")
+            return float("inf"), took
