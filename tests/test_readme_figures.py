@@ -223,13 +223,13 @@ def test_the_rendering_is_scipys(exact, true_kernel):
         assert abs(above - share) < SIGMAS * np.sqrt(share * (1.0 - share) / errors.size)
 
 
-def test_light_that_models_put_at_the_wrong_radius(exact):
+def test_what_models_put_at_the_wrong_radius(exact):
     page = (Path(__file__).parents[1] / "docs" / "simulate.md").read_text(encoding="utf-8")
     page = " ".join(page.split())
     skin1 = Material("skin1", ("R", "G", "B"), (SKIN1,))
     for model, words in (
-        (simulate_dipole, "The classical dipole puts {:.0f} to {:.0f} % of skin1's light"),
-        (simulate_burley, "although it uses the true total, {:.0f} to {:.0f} %"),
+        (simulate_dipole, "by the classical dipole is off by {:.0f} to {:.0f} % of skin1's light"),
+        (simulate_burley, "although it uses the true total, by {:.0f} to {:.0f} %"),
     ):
         away = np.abs(model(skin1).cumulative - exact.cumulative).max(axis=0)
         share = 100.0 * away / exact.diffuse_reflectance
