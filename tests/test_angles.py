@@ -274,7 +274,7 @@ def test_what_no_walk_makes_is_refused(skin, change, said):
 
 def test_a_profile_without_angles_has_no_curve():
     plain = simulate_montecarlo(load_material("skin1"), photons=2000)
-    with pytest.raises(ProfileError, match="has no exit angles; compute it with `angles = 30`"):
+    with pytest.raises(ProfileError, match="have them with `angles = 30`"):
         angular_reflectance(plain)
 
 

@@ -32,8 +32,14 @@ from sssfit.fit import fit_burley, fit_preintegrated
 from sssfit.kernel import Taps
 from sssfit.material import Layer, Material, load_material
 from sssfit.methods import PRESETS
+from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_exact, simulate_gaussians, simulate_multipole
+from sssfit.simulate import (
+    simulate_deon_skin,
+    simulate_exact,
+    simulate_gaussians,
+    simulate_multipole,
+)
 
 MEDIA = ("openpbr", "materialx", "pbrt", "mitsuba", "gltf")
 # Every preset, and what a user may choose that changes the conversion.
@@ -333,6 +339,20 @@ def test_layers_are_sent_where_a_preset_takes_them(name):
         preset_of(name, slab)
     if name in ("unreal", "hdrp"):
         assert preset_of(name, profile).title == "slab"
+
+
+@pytest.mark.parametrize("name", [name for name in PRESETS if name not in MEDIA])
+def test_skin_whose_energy_is_1_but_for_rounding_is_converted(name):
+    """That of the six Gaussians is 1 + 7e-16, which is no share."""
+    skin = simulate_deon_skin()
+    assert 1.0 < skin.diffuse_reflectance.max() < 1.0 + 1e-14
+    found = preset_of(name, skin)
+    look = engine_look(found)
+    energy = look.diffuse_reflectance if isinstance(look, Profile) else look.energy
+    most = normal_transmittance(1.4) if name == "blender" else 1.0
+    np.testing.assert_allclose(energy, most, rtol=1e-6)
+    said = "Below the interface of index 1.4 a white base colour returns 0.9722 of the light, and"
+    assert any(said in each for each in found.warnings) == (name == "blender")
 
 
 @pytest.mark.parametrize("name", MEDIA)

@@ -200,7 +200,8 @@ def of_all_annuli(profile: Profile) -> dict[str, FloatArray]:
 def _angles_of(profile: Profile) -> tuple[FloatArray, FloatArray]:
     if profile.exit_angle_edges_rad is None or profile.angle_reflected is None:
         raise ProfileError(
-            f"the profile of {profile.label} has no exit angles; compute it with `angles = 30`."
+            f"the profile of {profile.label} has no exit angles; a material's walk and its exact "
+            "profile have them with `angles = 30`."
         )
     return profile.exit_angle_edges_rad, profile.angle_reflected
 

@@ -38,6 +38,7 @@ from sssfit.simulate import simulate_exact
 from sssfit.simulate.dipole import mismatch_by_polynomial
 
 METHODS = ("burley", "eevee", "random_walk", "random_walk_skin")
+_ROUNDING = 1e-9  # of a share
 _MM = 1000.0
 _SPAN = 4.0 * math.pi
 _LEAST_ALBEDO = 0.2  # Cycles raises smaller albedos of walks to it, and dims the light instead
@@ -100,7 +101,7 @@ def convert(source: Source, chosen: Values) -> Values:
     A walk's own shape is first taken for equal paths, then corrected once with the look itself,
     whose channels share a grid: what it draws then gives the same radii to 1e-8.
     """
-    method, eta = str(chosen["method"]), min(max(source.eta, 1.01), 3.8)
+    method, eta = str(chosen["method"]), _index(source)
     colour = np.minimum(source.reflectance / normal_transmittance(eta), 1.0)
     shapes = source.shapes_per_mm
     width_mm = (_walk_shapes(colour) if "walk" in method else 1.0) / shapes
@@ -116,6 +117,23 @@ def convert(source: Source, chosen: Values) -> Values:
         "subsurface_scale": float(radius_mm.max()) / unit_mm,
         "ior": eta,
     }
+
+
+def _index(source: Source) -> float:
+    """Return the refractive index within the limits of the node."""
+    return min(max(source.eta, 1.01), 3.8)
+
+
+def losses(source: Source) -> tuple[str, ...]:
+    """Return a warning where more light returns than from white below the interface."""
+    eta = _index(source)
+    most, wanted = normal_transmittance(eta), float(source.reflectance.max())
+    if wanted <= most * (1.0 + _ROUNDING):
+        return ()
+    return (
+        f"Below the interface of index {eta:g} a white base colour returns {most:.4g} of the "
+        f"light, and {source.title} returns {wanted:.4g}: it is drawn darker.",
+    )
 
 
 def _walk_shapes(colour: FloatArray) -> FloatArray:
@@ -210,4 +228,5 @@ BLENDER = Preset(
         "eevee_subsurface_convolve_comp.glsl, burley_setup",
     ),
     doubts=doubts,
+    losses=losses,
 )

@@ -41,8 +41,11 @@ class Source:
 
     @property
     def reflectance(self) -> FloatArray:
-        """Diffuse reflectance R_d (3,), a share of the incident light."""
-        return self.profile.diffuse_reflectance
+        """Diffuse reflectance R_d (3,), a share of the incident light.
+
+        At most 1: the sum of the six Gaussians of skin, whose energy is 1, is 7e-16 above it.
+        """
+        return np.minimum(self.profile.diffuse_reflectance, 1.0)
 
     @functools.cached_property
     def shapes_per_mm(self) -> FloatArray:
