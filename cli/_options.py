@@ -71,15 +71,19 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _Notes(logging.Handler):
+    def __init__(self, context: click.Context) -> None:
+        super().__init__()
+        self.context = context  # threads, from which notes come too, have none of their own
+
     def emit(self, record: logging.LogRecord) -> None:
-        with contextlib.suppress(OSError):  # a note that nobody can read ends no run
+        with contextlib.suppress(OSError), self.context.scope(cleanup=False):
             click.echo(printable(in_options(record.getMessage())), err=True)
 
 
 @contextlib.contextmanager
 def _notes_on_stderr(quiet: bool) -> Iterator[None]:
-    """Print what the library notes, and our own notes, on stderr, unless ``quiet``."""
-    log, handler = logging.getLogger("sssfit"), _Notes()
+    """Print notes, the library's and ours, on stderr, unless ``quiet``; a lost one ends no run."""
+    log, handler = logging.getLogger("sssfit"), _Notes(click.get_current_context())
     log.setLevel(logging.ERROR if quiet else logging.INFO)
     log.addHandler(handler)
     try:

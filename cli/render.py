@@ -97,11 +97,7 @@ def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rendered(
-    kernel: Kernel,
-    name: str,
-    given: Mapping[str, Any],
-    own: dict[str, Any],
-    common: Common,
+    kernel: Kernel, name: str, given: Mapping[str, Any], own: dict[str, Any], common: Common
 ) -> tuple[str | None, Evaluation]:
     """Light the picture and render it; return the file of its profile, too."""
     from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space

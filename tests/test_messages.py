@@ -3,6 +3,7 @@
 import ast
 import functools
 import re
+import threading
 from pathlib import Path
 
 import click
@@ -10,7 +11,7 @@ import pytest
 
 from sssfit.cli import main
 from sssfit.cli._main import cli
-from sssfit.cli._options import in_options
+from sssfit.cli._options import _notes_on_stderr, in_options
 from sssfit.messages import Columns, counted, filled, note, number, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
@@ -116,6 +117,14 @@ def test_arguments_become_options_where_the_command_line_prints_them(said, print
 def test_an_option_that_the_verb_lacks_is_named_with_its_own_verb(verb, said, printed):
     with click.Context(cli.commands[verb], info_name=verb):
         assert in_options(said).startswith(printed)
+
+
+def test_notes_from_threads_name_the_options_of_the_verb_that_runs(capsys):
+    with click.Context(cli.commands["compare"], info_name="compare"), _notes_on_stderr(quiet=False):
+        thread = threading.Thread(target=note, args=("stack R: try `method = montecarlo`.",))
+        thread.start()
+        thread.join()
+    assert capsys.readouterr().err == "stack R: try `sssfit simulate --method montecarlo`.\n"
 
 
 def test_errors_name_options_of_the_verb_that_ran(tmp_path, capsys):
