@@ -326,7 +326,11 @@ def test_a_kernel_of_one_pixel_and_a_picture_of_one(rng):
         ({"distance_mm": None}, {}, "needs distance_mm"),
         ({"depth_mm": np.zeros((4, 5))}, {}, "depth_mm is 0 in 20 pixels"),
         ({"depth_mm": np.full((4, 5), 1e-300)}, {}, "would reach"),
-        ({"specular": np.ones((4, 5, 2))}, {}, "specular of shape"),
+        (
+            {"irradiance": np.ones((4, 5, 1)), "specular": np.ones((4, 5, 2))},
+            {},
+            "specular of shape",
+        ),
         ({"irradiance": np.ones((4, 5, 2))}, {}, "irradiance of shape"),
         ({}, {"follow": "lurp"}, "follow = 'lurp'; expected one of none, lerp, gaussian"),
         ({}, {"lost": "all"}, "lost = 'all'"),
@@ -355,6 +359,19 @@ def test_buffers_of_a_scene_have_their_number_of_axes(field):
     with pytest.raises(RenderError, match=rf"^bad: {field} of shape .*; expected rows") as error:
         Scene("bad", np.ones((4, 5, 3)), 0.5, **{field: np.ones(wrong)})
     assert str(wrong) in str(error.value)
+
+
+@pytest.mark.parametrize("field", ["specular", "back_irradiance"])
+def test_light_of_a_scene_has_as_many_channels_everywhere_or_one(field):
+    """Beside irradiance of one channel it may have any."""
+    for channels, fitting in ((3, (1, 3)), (1, (1, 2, 3, 4))):
+        for count in range(5):
+            buffers = {"irradiance": np.ones((4, 5, channels)), field: np.ones((4, 5, count))}
+            if count in fitting:
+                assert getattr(Scene("good", mm_per_pixel=0.5, **buffers), field).shape[2] == count
+            else:
+                with pytest.raises(RenderError, match=rf"^bad: {field} of shape \(4, 5, {count}\)"):
+                    Scene("bad", mm_per_pixel=0.5, **buffers)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from sssfit.render.transmittance import (
     gaussians_of,
     through,
     transmittance,
+    transmitted,
     with_transmitted,
 )
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
@@ -151,6 +152,16 @@ def test_a_scene_takes_up_what_comes_through():
     np.testing.assert_allclose(render_screen(joined, kernel), render_screen(scene, kernel))
     with pytest.raises(RenderError, match="test has no thickness and no light behind it"):
         with_transmitted(joined, kernel)
+
+
+@pytest.mark.parametrize("channels", [2, 4])
+def test_light_from_behind_has_the_kernels_channels_or_one(channels):
+    kernel = make_kernel(np.full((1, 1, 3), 0.5), parameters=dict.fromkeys("RGB", FITTED))
+    front, back = np.ones((2, 2, 1)), np.ones((2, 2, channels))
+    scene = make_scene(front, thickness_mm=np.ones((2, 2)), back_irradiance=back)
+    for function in (transmitted, with_transmitted):
+        with pytest.raises(RenderError, match=f"2, {channels}.* for a kernel of 3 channels; exp"):
+            function(scene, kernel)
 
 
 def test_light_from_behind_joins_before_the_blur():

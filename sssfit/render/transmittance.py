@@ -29,6 +29,7 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel, SeparableKernel, Taps
+from sssfit.messages import counted
 from sssfit.render.taps import response
 from sssfit.scene.record import Scene
 
@@ -202,7 +203,8 @@ def transmitted(scene: Scene, kernel: Kernel) -> FloatArray | None:
     Raises
     ------
     RenderError
-        One of the two buffers is missing, or a channel's Gaussians have no positive sum.
+        One of the two buffers is missing, the light behind has other channels than one or the
+        kernel's, or a channel's Gaussians have no positive sum.
     """
     if scene.thickness_mm is None and scene.back_irradiance is None:
         return None
@@ -212,7 +214,13 @@ def transmitted(scene: Scene, kernel: Kernel) -> FloatArray | None:
             f"{scene.name}: light through the object needs thickness_mm and back_irradiance, and "
             f"{missing} is missing; give both or neither."
         )
-    arrives = np.zeros((scene.height, scene.width, len(kernel.channels)))
+    channels = len(kernel.channels)
+    if scene.back_irradiance.shape[2] not in (1, channels):
+        raise RenderError(
+            f"{scene.name}: back_irradiance of shape {scene.back_irradiance.shape} for a kernel of "
+            f"{counted(channels, 'channel')}; expected as many channels, or one."
+        )
+    arrives = np.zeros((scene.height, scene.width, channels))
     lit = (scene.back_irradiance > 0.0).any(axis=2)  # most pixels have no light behind them
     arrives[lit] = scene.back_irradiance[lit] * through(kernel, scene.thickness_mm[lit])
     return arrives

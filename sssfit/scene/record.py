@@ -44,11 +44,12 @@ class Scene(ReadOnly):
     mask : array (H, W) of int, optional
         Number of the translucent object of a pixel, from 1; 0 for everything else.
     specular : array (H, W, C) or (H, W, 1), optional
-        Light reflected at the surface: never blurred, added afterwards.
+        Light reflected at the surface: never blurred, added afterwards. Beside irradiance of one
+        channel it may have those of the kernel.
     thickness_mm : array (H, W), optional [mm]
         Path of the light inside the object to this point.
     back_irradiance : array (H, W, C) or (H, W, 1), optional
-        Irradiance where that light enters.
+        Irradiance where that light enters; its channels are like those of ``specular``.
     alpha : array (H, W), optional
         Coverage of a picture from a file, 0 to 1, kept for the output and never blurred.
     alpha_is_multiplied : bool
@@ -198,7 +199,7 @@ class Scene(ReadOnly):
         object.__setattr__(self, field, kept)
 
     def _check_shape(self, field: str, shape: tuple[int, ...]) -> None:
-        size = np.shape(self.irradiance)[:2]
+        size, channels = np.shape(self.irradiance)[:2], np.shape(self.irradiance)[2]
         if shape[:2] != size:
             raise RenderError(
                 f"{self.name}: {field} is {shape[:2]} and irradiance {size}; expected the same "
@@ -207,6 +208,11 @@ class Scene(ReadOnly):
         if (len(shape) == 3) != (field in _WITH_CHANNELS) or len(shape) > 3:
             has = "rows, columns and channels" if field in _WITH_CHANNELS else "rows and columns"
             raise RenderError(f"{self.name}: {field} of shape {shape}; expected {has}.")
+        if len(shape) == 3 and shape[2] not in (1, channels) and (channels > 1 or shape[2] == 0):
+            raise RenderError(
+                f"{self.name}: {field} of shape {shape} beside irradiance of "
+                f"{counted(channels, 'channel')}; expected as many channels, or one."
+            )
 
     def for_channels(self, names: Sequence[str]) -> "Scene":
         """Return the scene with its channels in this order, if a file named them the same.
