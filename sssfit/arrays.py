@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -31,8 +31,11 @@ _SHA256 = re.compile(r"[0-9a-f]{1,64}")
 def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArray:
     """Return a read-only float64 copy, because a frozen record does not protect array contents.
 
-    Texts and booleans are not numbers, although numpy would convert them.
+    Texts and booleans are not numbers, although numpy would convert them; nor are values under a
+    mask, which it would use.
     """
+    if np.ma.is_masked(value):
+        raise error(f"{name} is a masked array; fill it first: array.filled(0.0).")
     try:
         array = np.array(value, dtype=np.float64, order="C") if _is_numeric(value) else None
     except (TypeError, ValueError, OverflowError):  # an integer of 400 digits
@@ -52,6 +55,13 @@ def is_number(value: object) -> TypeGuard[float]:
     except OverflowError:  # an integer of 400 digits
         return False
     return True
+
+
+def check_record(name: str, value: object, kind: Any, error: type[SssfitError]) -> None:
+    """Raise ``error`` unless a value is a record of a class, or of one of a union of them."""
+    if not isinstance(value, kind):
+        words = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
+        raise error(f"{name} = {shown(value)}; expected the record {words}.")
 
 
 def true_or_false(name: str, value: object, error: type[SssfitError]) -> bool:

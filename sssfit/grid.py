@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sssfit.arrays import check_record
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.messages import shown
@@ -97,6 +98,7 @@ def make_grid(
         A length is not finite and above 0, the rings are wider than the radius, or there are over
         100 000 of them; the message names valid widths and radii.
     """
+    check_record("material", material, Material, SimulationError)
     paths_mm = np.concatenate([layer.mean_free_path_mm for layer in material.layers])
     paths_mm = paths_mm[np.isfinite(paths_mm)]
     shortest, longest = float(paths_mm.min()), float(paths_mm.max())

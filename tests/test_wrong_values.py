@@ -11,17 +11,45 @@ import pytest
 from reference_pixels import one_over_r_profile
 
 import sssfit
-from sssfit.errors import FitError, SssfitError
+from sssfit.choose.choice import choose
+from sssfit.compare.comparison import pareto_front
+from sssfit.compare.guide import compute_guide
+from sssfit.compare.kernel_view import view_kernel
+from sssfit.compare.models import material_of_walk
+from sssfit.compare.motion import motion
+from sssfit.compare.taps_view import view_taps
+from sssfit.errors import FitError, ProfileError, RenderError, SssfitError
+from sssfit.export.lut import lut_bytes
+from sssfit.export.presets import preset
 from sssfit.fit import fit_preintegrated
+from sssfit.fit.artist import fit_artist
+from sssfit.fit.cascade import fit_cascade
 from sssfit.fit.disk import fit_disk
+from sssfit.fit.gaussian_chain import fit_gaussian_chain
+from sssfit.fit.on_taps import on_taps
+from sssfit.fit.pyramid import fit_pyramid
+from sssfit.formats.csv import csv_text
 from sssfit.formats.pictures import Image
-from sssfit.grid import RadialGrid
+from sssfit.grid import RadialGrid, make_grid
 from sssfit.kernel import Taps
+from sssfit.kernel.between import taps_between
 from sssfit.kernel.taps import Stage
 from sssfit.material import load_material
+from sssfit.measure.asymmetry import radial_asymmetry
+from sssfit.measure.cost import cost_of
+from sssfit.measure.delta_e import auto_exposure
 from sssfit.measure.score import measure
+from sssfit.motion.run import make_frames
+from sssfit.profile.beam import parse_beam, under_beam
+from sssfit.profile.frequency import frequency_response
+from sssfit.profile.smooth import smoothed
+from sssfit.render.adaptive import make_sampler, render_samples, samples_for
+from sssfit.render.bloom import bloomed
 from sssfit.render.jitter import Jitter
 from sssfit.render.reference import render_reference
+from sssfit.render.screen import render_screen
+from sssfit.render.taps import render_taps
+from sssfit.render.transmittance import beyond, through, transmittance
 from sssfit.scene.made import make_scene
 from sssfit.scene.mesh import Mesh
 from sssfit.simulate import read_checkpoint
@@ -48,6 +76,8 @@ RECORDS = [
     Mesh("m", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.eye(3)[:, :2], np.array([[0, 1, 2]])),
     RadialGrid(0.1, 10),
 ]
+DEEP = dataclasses.replace(SCENE, distance_mm=300.0, depth_mm=np.full((4, 4), 300.0))
+SAMPLER = make_sampler(PROFILE, 0.5)
 SIZES = {"dr_mm": 0.5, "radius_mm": 5.0}
 CALLS = {
     "load": (sssfit.load, {"source": "skin1", "origin": "x"}),
@@ -109,6 +139,46 @@ CALLS = {
         {"image": LIGHT, "truth": LIGHT, "exposure": None, "mask": None, "structure": False},
     ),
     "render_reference": (render_reference, {"scene": SCENE, "profile": PROFILE}),
+    "render_taps": (render_taps, {"scene": SCENE, "taps": TAPS, "coverage": None}),
+    "render_screen": (
+        render_screen,
+        {"scene": DEEP, "kernel": KERNEL, "scale": 1.0, "depth_variance_mm2": 1.0},
+    ),
+    "render_samples": (
+        render_samples,
+        {"scene": SCENE, "sampler": SAMPLER, "counts": 2, "scale": 1.0},
+    ),
+    "make_sampler": (make_sampler, {"profile": PROFILE, "mm_per_pixel": 0.5}),
+    "samples_for": (samples_for, {"variance": 0.1, "target_variance": 0.01, "start": 1}),
+    "through": (through, {"kernel": KERNEL, "thickness_mm": 1.0}),
+    "beyond": (beyond, {"kernel": KERNEL, "thickness_mm": 1.0}),
+    "transmittance": (
+        transmittance,
+        {"thickness_mm": 1.0, "variances_mm2": [[1.0]], "weights": [[1.0]], "widths": 2.0},
+    ),
+    "bloomed": (bloomed, {"picture": LIGHT, "share": 0.1}),
+    "auto_exposure": (auto_exposure, {"truth": LIGHT, "mask": None}),
+    "radial_asymmetry": (radial_asymmetry, {"response": np.eye(5), "from_pixels": 1}),
+    "pareto_front": (pareto_front, {"cost": [1.0, 2.0], "error": [2.0, 1.0]}),
+    "frequency_response": (frequency_response, {"profile": PROFILE, "k_per_mm": [0.0, 1.0]}),
+    "under_beam": (under_beam, {"profile": PROFILE, "beam": parse_beam("flat:0.5")}),
+    "parse_beam": (parse_beam, {"text": "flat:0.5"}),
+    "smoothed": (smoothed, {"profile": PROFILE}),
+    "csv_text": (csv_text, {"profile": PROFILE}),
+    "view_kernel": (view_kernel, {"kernel": KERNEL, "profile": None, "channels": None}),
+    "view_taps": (view_taps, {"taps": TAPS, "profile": None}),
+    "motion": (motion, {"kernel": KERNEL, "profile": PROFILE, "positions": 1}),
+    "cost_of": (cost_of, {"kernel": KERNEL}),
+    "make_frames": (make_frames, {"profile": PROFILE, "scene": SCENE, "shift": (0, 0)}),
+    "taps_between": (taps_between, {"first": TAPS, "second": TAPS, "mm_per_pixel": 0.5}),
+    "on_taps": (on_taps, {"kernel": KERNEL, "taps": 3, "place": "cumulative"}),
+    "fit_cascade": (fit_cascade, {"profile": PROFILE}),
+    "fit_pyramid": (fit_pyramid, {"profile": PROFILE}),
+    "fit_gaussian_chain": (fit_gaussian_chain, {"profile": PROFILE}),
+    "make_grid": (make_grid, {"material": MATERIAL, **SIZES}),
+    "material_of_walk": (material_of_walk, {"profile": PROFILE}),
+    "choose": (lambda **given: choose(mm_per_pixel=-1.0, **given), {"source": PROFILE}),
+    "preset": (preset, {"name": "unreal"}),
     "load_plan": (load_plan, {"path": "a"}),
     "sweep_to_store": (sweep_to_store, {"plan": "p.toml", "path": "x.zarr"}),
 }
@@ -165,3 +235,26 @@ def test_light_near_the_largest_number_is_summed_or_refused():
 def test_seeds_of_fits(seed):
     with pytest.raises(FitError, match="seed = "):
         sssfit.fit(PROFILE, "cascade", stages="1-1", mm_per_pixel=0.5, seed=seed)
+
+
+def test_numbers_under_a_mask_are_not_used():
+    hidden = np.ma.masked_array(PROFILE.annulus_energy, PROFILE.annulus_energy > 0.01)
+    with pytest.raises(ProfileError, match=r"^annulus_energy is a masked array; fill it first"):
+        dataclasses.replace(PROFILE, annulus_energy=hidden)
+    with pytest.raises(RenderError, match=r"^truth is a masked array; fill it first"):
+        auto_exposure(np.ma.masked_array(LIGHT, LIGHT > 0.5))
+    shown = np.ma.masked_array(PROFILE.annulus_energy)
+    assert dataclasses.replace(PROFILE, annulus_energy=shown).sha256 == PROFILE.sha256
+
+
+@pytest.mark.parametrize(
+    ("call", "given"),
+    [
+        (lut_bytes, {"sources": [PROFILE], "ending": "a\nb"}),
+        (compute_guide, {"profile": PROFILE, "channel": "a\nb", "mm_per_pixel": 1.0}),
+        (fit_artist, {"profile": PROFILE, "target": "a\nb"}),
+        (view_kernel, {"kernel": KERNEL, "channels": ["a\nb"]}),
+    ],
+)
+def test_a_name_on_two_lines_is_told_on_one(call, given):
+    assert refused(call, **given)

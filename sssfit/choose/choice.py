@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, check_record, plain
 from sssfit.choose.options import Option, check_caps, half_pixels, options
 from sssfit.choose.truth import (
     PhotonNeed,
@@ -286,6 +286,7 @@ def choose(
     SimulationError, FitError
         No profile, or one that cannot be fitted.
     """
+    check_record("source", source, Material | Profile, RenderError)
     note_truth(source)
     if tolerance is None and fetches is None:
         tolerance = TOLERANCE

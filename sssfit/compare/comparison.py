@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import RenderError
 from sssfit.fit import support_of
+from sssfit.formats.colours import as_light
 from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.profile import Profile
 
@@ -43,7 +44,7 @@ def pareto_front(cost: npt.ArrayLike, error: npt.ArrayLike) -> npt.NDArray[np.bo
     >>> pareto_front([2, 2, 4, 6], [0.5, 0.3, 0.4, 0.1]).tolist()
     [False, True, False, True]
     """
-    costs, errors = np.asarray(cost, dtype=np.float64), np.asarray(error, dtype=np.float64)
+    costs, errors = as_light(cost, "cost"), as_light(error, "error")
     if costs.ndim != 1 or costs.shape != errors.shape:
         raise RenderError(
             f"cost of shape {costs.shape}, error {errors.shape}; expected two lists of one length."

@@ -22,6 +22,7 @@ from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._target import Pitch, Target
 from sssfit.fit.guided import DRAWN_K, extents_of, gamma, guided_target
+from sssfit.messages import printable
 from sssfit.profile import Profile
 
 DRAWN = (0.0, DRAWN_K, 4.0)  # the paper's nearest light, what it draws, its farthest light
@@ -207,8 +208,10 @@ def _chosen(target: Target, channel: str | None) -> int:
     names = target.profile.channels
     if channel is None:
         return int(np.argmin(target.is_empty))
-    if channel not in names:
-        raise FitError(f"there is no channel {channel}; expected one of {', '.join(names)}.")
+    if not isinstance(channel, str) or channel not in names:
+        raise FitError(
+            f"there is no channel {printable(str(channel))}; expected one of {', '.join(names)}."
+        )
     if target.is_empty[names.index(channel)]:
         raise FitError(f"channel {channel} returns no light: choose another.")
     return names.index(channel)

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, check_record, plain
 from sssfit.errors import KernelError
 from sssfit.kernel import SeparableKernel
+from sssfit.messages import printable, shown
 from sssfit.profile import Profile
 
 MOST_CHANNELS = 3
@@ -121,6 +122,8 @@ def view_kernel(
     >>> (100 * view.misplaced).round(1).tolist()
     [5.3, 2.6, 1.0]
     """
+    check_record("kernel", kernel, SeparableKernel, KernelError)
+    check_record("profile", profile, Profile | None, KernelError)
     chosen = _chosen(kernel, channels)
     if profile is not None and profile.channels != kernel.channels:
         raise KernelError(
@@ -193,10 +196,13 @@ def _chosen(kernel: SeparableKernel, names: Sequence[str] | None) -> tuple[int, 
         count = len(kernel.channels)
         indices = np.linspace(0, count - 1, min(count, MOST_CHANNELS)).round()
         return tuple(int(each) for each in indices)
+    if not isinstance(names, list | tuple) or not names:
+        raise KernelError(f"channels = {shown(names)}; expected a list of names, or None for all.")
     for name in names:
         if name not in kernel.channels:
             raise KernelError(
-                f"there is no channel {name}; expected one of {', '.join(kernel.channels)}."
+                f"there is no channel {printable(str(name))}; expected one of "
+                f"{', '.join(kernel.channels)}."
             )
     return tuple(kernel.channels.index(name) for name in names)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, check_record, plain
 from sssfit.compare.covered import model_profiles
 from sssfit.errors import ProfileError, SimulationError
 from sssfit.material import Material
@@ -207,6 +207,7 @@ def material_of_walk(profile: Profile) -> Material:
     ProfileError
         It is of another method, under a beam, or does not say its material.
     """
+    check_record("profile", profile, Profile, ProfileError)
     if "beam" in profile.meta:
         raise ProfileError(
             f"the profile of {profile.label} is under a beam, {profile.meta['beam']}; name the "

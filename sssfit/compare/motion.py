@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, check_record, is_whole, plain
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel
 from sssfit.measure.score import measure
+from sssfit.messages import shown
 from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.render.reference import render_reference
@@ -24,6 +25,7 @@ PIXELS = 129  # a side of the pictures
 NEAR_PIXELS = 16  # what is judged: as far from the point, and from the middle of the edge
 EDGE_DEGREES = 30.0
 _WHOLE = ((0, 1), (1, 0), (1, 1))
+_MOST_POSITIONS = 1000  # along an axis: a million pictures
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +77,12 @@ def motion(kernel: Kernel, profile: Profile, *, positions: int = 10) -> Motion:
     RenderError
         There is no position, or the kernel does not fit the profile.
     """
-    if positions < 1:
-        raise RenderError(f"positions = {positions}; expected at least 1.")
+    check_record("kernel", kernel, Kernel, RenderError)
+    check_record("profile", profile, Profile, RenderError)
+    if not is_whole(positions) or not 1 <= positions <= _MOST_POSITIONS:
+        raise RenderError(
+            f"positions = {shown(positions)}; expected at least 1, at most {_MOST_POSITIONS}."
+        )
     if kernel.channels != profile.channels:
         raise RenderError("the kernel's channels are not the profile's; give its own profile.")
     places = [(i / positions, j / positions) for i, j in np.ndindex(positions, positions)]

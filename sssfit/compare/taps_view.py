@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, check_record, plain
 from sssfit.errors import KernelError
 from sssfit.kernel import Taps
 from sssfit.profile import Profile
@@ -77,6 +77,8 @@ def view_taps(taps: Taps, profile: Profile | None = None) -> TapsView:
     KernelError
         The profile has other channels.
     """
+    check_record("taps", taps, Taps, KernelError)
+    check_record("profile", profile, Profile | None, KernelError)
     if profile is not None and profile.channels != taps.channels:
         raise KernelError(
             f"the table of taps has the channels {', '.join(taps.channels)} and the profile "

@@ -26,7 +26,7 @@ from sssfit.errors import KernelError
 from sssfit.files import has_mark
 from sssfit.formats.pictures import is_image_file, save_image
 from sssfit.kernel import Kernel, SeparableKernel, Taps
-from sssfit.messages import note, of_material, shown
+from sssfit.messages import note, of_material, printable, shown
 from sssfit.profile import Profile
 from sssfit.profile.pixels import full_kernel
 
@@ -84,8 +84,9 @@ def lut_bytes(
     """
     if len(sources) != 1:
         raise KernelError("a texture holds one profile or kernel; write the others one by one.")
-    if ending not in ENDINGS:
-        raise KernelError(f"{ending or 'no ending'}: textures are written as {', '.join(ENDINGS)}.")
+    if not isinstance(ending, str) or ending not in ENDINGS:
+        said = printable(str(ending)) or "no ending"
+        raise KernelError(f"{said}: textures are written as {', '.join(ENDINGS)}.")
     source = sources[0]
     _check_table(table)
     given = {"texels": texels, "radius": radius_mm, "mm_per_pixel": mm_per_pixel}

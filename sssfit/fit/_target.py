@@ -100,8 +100,8 @@ def make_target(
         The kernel is a single pixel (the identity), or the profile returns more energy than went
         in.
     """
-    _check_profile(profile)
     pitch = pitch_of(profile, mm_per_pixel)
+    _check_profile(profile)
     if not isinstance(support_mm, Real | None):
         raise FitError(f"support_mm = {shown(support_mm)}; expected a length in mm.")
     support = support_of(profile) if support_mm is None else _as_float(support_mm)
@@ -143,6 +143,8 @@ def _check_reach(profile: Profile, support_mm: float, pitch: float) -> None:
 
 def pitch_of(profile: Profile, mm_per_pixel: Pitch | None = None) -> float:
     """Return the pixel size [mm]: the given one, `MM_PER_PIXEL`, or the profile's for "profile"."""
+    if not isinstance(profile, Profile):
+        raise FitError(f"profile = {shown(profile)}; expected a Profile. sssfit.load reads files.")
     if mm_per_pixel is None:
         return MM_PER_PIXEL
     if isinstance(mm_per_pixel, str) and mm_per_pixel == "profile":
@@ -199,8 +201,6 @@ def _check_light(target: Target) -> None:
 
 def _check_profile(profile: Profile) -> None:
     """Raise FitError for data that no fit can use."""
-    if not isinstance(profile, Profile):
-        raise FitError(f"profile = {shown(profile)}; expected a Profile. sssfit.load reads files.")
     energy, name = profile.annulus_energy, profile.label
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; compute it again.")

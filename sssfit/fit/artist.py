@@ -30,6 +30,7 @@ from sssfit.fit._by_hand import (
 from sssfit.fit._nlopt import Minimum, minimise, minimise_by_simplex
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.messages import printable
 from sssfit.profile import Profile
 
 _WIDTHS = 10  # widths tried for each Gaussian, in all pairs, before the best are refined
@@ -96,9 +97,11 @@ def fit_artist(
     FitError, ProfileError
         The profile, the pixels or a setting is invalid.
     """
-    if not callable(target) and target not in ("line", "kernel"):
+    is_named = isinstance(target, str) and target in ("line", "kernel")
+    if not is_named and not callable(target):
         raise FitError(
-            f'target = "{target}"; expected "line", "kernel" or a function that judges pictures.'
+            f'target = "{printable(str(target))}"; expected "line", "kernel" or a function that '
+            "judges pictures."
         )
     pixels = make_target(profile, mm_per_pixel, support_mm)
     by_hand = _by_hand(near_mm2, far_mm2, weight, profile.channels)

@@ -186,8 +186,8 @@ def whole_target(
     FitError
         As `make_target`; or a pixel is wider than the support, where it warns.
     """
-    support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
     pitch = pitch_of(profile, mm_per_pixel)
+    support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
     if isinstance(support_mm, Real) and 0.0 < support_mm < (1.0 - 1e-9) * pitch:
         raise FitError(
             f"a pixel of {pitch:g} mm is wider than the support of {support_mm:.4g} mm, which "

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, check_record
 from sssfit.errors import FitError, KernelError
 from sssfit.fit._fitted_taps import refined
 from sssfit.fit._spectrum import SpectralTarget, pictures_of, spectral_target
@@ -78,6 +78,7 @@ def on_taps(
     ArgumentError, FileError, RenderError
         There is no such picture, or it cannot be read.
     """
+    check_record("kernel", kernel, SeparableKernel, FitError)
     count = _checked(taps, kernel, place)
     half = kernel.weights[:, kernel.half_pixels :]  # (T, h+1, C)
     lit, wanted = _wanted(kernel, profile, spectrum, irradiance)
@@ -114,7 +115,7 @@ def on_taps(
 
 def _checked(taps: object, kernel: SeparableKernel, place: str) -> int:
     """Return the number of taps, or raise FitError."""
-    if place not in PLACES:
+    if not isinstance(place, str) or place not in PLACES:
         raise FitError(f"place = {shown(place)}; expected {' or '.join(map(repr, PLACES))}.")
     try:
         count = operator.index(taps)  # type: ignore[arg-type]

@@ -36,7 +36,7 @@ from pathlib import Path
 import numpy as np
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray, check_names
+from sssfit.arrays import FloatArray, check_names, check_record
 from sssfit.errors import MaterialError, ProfileError, SssfitWarning
 from sssfit.files import has_mark
 from sssfit.messages import counted, note, printable, shown
@@ -182,6 +182,7 @@ def csv_text(profile: Profile) -> str:
         A channel's name cannot be the head of a column, or its energies could not be read back: one
         is below 0, or they add up to more than 1.
     """
+    check_record("profile", profile, Profile, ProfileError)
     _check_names(profile.channels)
     _check_energies(profile)
     stream = io.StringIO()

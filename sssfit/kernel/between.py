@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from sssfit.arrays import check_record
 from sssfit.errors import KernelError
 from sssfit.kernel.checks import checked_pitch
 from sssfit.kernel.taps import Stage, Taps
@@ -46,6 +47,8 @@ def taps_between(first: Taps, second: Taps, mm_per_pixel: float) -> Taps:
     KernelError
         The tables have other stages or channels, or the pixel size is not between theirs.
     """
+    check_record("first", first, Taps, KernelError)
+    check_record("second", second, Taps, KernelError)
     pitch = checked_pitch(mm_per_pixel)
     _check_alike(first, second)
     ends = first.mm_per_pixel, second.mm_per_pixel

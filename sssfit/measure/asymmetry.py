@@ -7,8 +7,10 @@ small highlights.
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_whole
 from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light
+from sssfit.messages import shown
 
 # A multiple of 8, so that axes and diagonals are included; 8192 angles change skin1's rank 1 by
 # 2e-5.
@@ -43,8 +45,10 @@ def radial_asymmetry(response: npt.ArrayLike, *, from_pixels: int = 1) -> float:
         such circle.
     """
     mean, mean_square = _moments(response)
-    if not 1 <= from_pixels <= len(mean):
-        raise RenderError(f"from_pixels = {from_pixels}; expected 1 to {len(mean)} for this size.")
+    if not is_whole(from_pixels) or not 1 <= from_pixels <= len(mean):
+        raise RenderError(
+            f"from_pixels = {shown(from_pixels)}; expected 1 to {len(mean)} for this size."
+        )
     mean, mean_square = mean[from_pixels - 1 :], mean_square[from_pixels - 1 :]
     radii = np.arange(from_pixels, from_pixels + len(mean))
     total = float(radii @ mean_square)
@@ -84,7 +88,7 @@ def _moments(response: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 def _checked(response: npt.ArrayLike) -> FloatArray:
     """Return the response as float64 with its largest value 1, or raise an error."""
-    picture = np.asarray(response, dtype=np.float64)
+    picture = as_light(response, "a point response")
     if picture.ndim != 2 or len(set(picture.shape)) != 1 or len(picture) % 2 == 0:
         raise RenderError(
             f"a point response of shape {picture.shape}; expected one channel, square, with an odd "

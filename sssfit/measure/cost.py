@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from sssfit.arrays import check_record
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.kernel.taps import BYTES, textures_for
@@ -65,6 +66,7 @@ def cost_of(kernel: Kernel, seconds_per_megapixel: float | None = None) -> Cost:
     Cost(fetches=198.0, passes=6, all_passes=6, bytes_per_pixel=112.0, kernel_bytes=1188, \
 seconds_per_megapixel=None)
     """
+    check_record("kernel", kernel, Kernel, RenderError)
     if isinstance(kernel, Taps):
         numbers = sum(each.offsets_mm.size + each.weights.size for each in kernel.stages)
         return Cost(

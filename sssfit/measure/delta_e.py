@@ -148,7 +148,7 @@ def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> fl
     RenderError
         No pixel is lit, or the truth or the mask is invalid.
     """
-    picture = np.asarray(truth, dtype=np.float64)
+    picture = as_light(truth, "truth")
     check_picture("truth", picture)
     return exposure_of(selected_pixels(picture, selection(mask, picture)))
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, is_whole
+from sssfit.arrays import FloatArray, check_record, is_whole
 from sssfit.errors import ArgumentError
 from sssfit.messages import did_you_mean, shown
 from sssfit.methods import LIGHTS, RENDERERS
@@ -132,6 +132,8 @@ def make_frames(
     threads: int | None = None,
 ) -> Frames:
     """Return the frames of a sequence; parameters and errors are those of `moving_light`."""
+    check_record("profile", profile, Profile, ArgumentError)
+    check_record("scene", scene, Scene, ArgumentError)
     if light not in LIGHTS:
         near = did_you_mean(str(light), list(LIGHTS))
         raise ArgumentError(f"light {shown(light)}: {near}expected one of {', '.join(LIGHTS)}.")

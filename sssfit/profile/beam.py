@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, check_record
 from sssfit.errors import ArgumentError, ProfileError
 from sssfit.messages import did_you_mean, shown
 from sssfit.profile.checks import TOTAL_ERRORS
@@ -91,7 +91,7 @@ def parse_beam(text: str) -> Beam:
     ProfileError
         The kind is unknown, or the radius is no length above 0.
     """
-    kind, _, words = text.partition(":")
+    kind, _, words = text.partition(":") if isinstance(text, str) else ("", "", "")
     if kind not in SPREADS:
         hint = did_you_mean(kind, list(SPREADS))
         raise ProfileError(
@@ -126,6 +126,8 @@ def under_beam(profile: Profile, beam: Beam) -> Profile:
     ProfileError
         The profile is under a beam already, or the beam reaches too many annuli.
     """
+    check_record("profile", profile, Profile, ProfileError)
+    check_record("beam", beam, Beam, ProfileError)
     if "beam" in profile.meta:
         raise ProfileError(f"the profile is under a beam already: {profile.meta['beam']}.")
     edges = wider_edges(profile.r_edges_mm, beam.reach_mm)

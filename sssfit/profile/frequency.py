@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, check_record, number_array, plain
 from sssfit.errors import ProfileError
 from sssfit.profile.pixels import flat_annuli
 from sssfit.profile.record import Profile
@@ -71,9 +71,11 @@ def frequency_response(
     Raises
     ------
     ProfileError
-        A frequency is negative or not finite.
+        A frequency is no number, negative or not finite.
     """
-    k = _frequencies(profile) if k_per_mm is None else np.atleast_1d(np.array(k_per_mm, float))
+    check_record("profile", profile, Profile, ProfileError)
+    given = _frequencies(profile) if k_per_mm is None else k_per_mm
+    k = np.atleast_1d(number_array("k_per_mm", given, ProfileError))
     if k.ndim != 1 or not (np.isfinite(k).all() and (k >= 0.0).all()):
         raise ProfileError("k_per_mm holds a frequency that is not a number from 0 up.")
     edges, densities = flat_annuli(profile.r_edges_mm, profile.annulus_energy)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 from scipy.interpolate import BSpline
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, check_record
 from sssfit.errors import ProfileError
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
@@ -56,6 +56,7 @@ def smoothed(profile: Profile) -> Profile:
     ProfileError
         The profile has no standard errors, or is under a beam, where annuli share photons.
     """
+    check_record("profile", profile, Profile, ProfileError)
     stderr = profile.annulus_energy_stderr
     if profile.shares_photons:
         raise ProfileError(

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, is_whole, read_only
+from sssfit.arrays import FloatArray, check_record, is_number, is_whole, read_only
 from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light, positive
 from sssfit.messages import shown
 from sssfit.process import thread_count
 from sssfit.profile import Profile
@@ -66,7 +67,8 @@ def make_sampler(profile: Profile, mm_per_pixel: float) -> KernelSampler:
     RenderError
         The pixel size is not a length above 0.
     """
-    if not (np.isfinite(mm_per_pixel) and mm_per_pixel > 0.0):
+    check_record("profile", profile, Profile, RenderError)
+    if not is_number(mm_per_pixel) or not 0.0 < mm_per_pixel < np.inf:
         raise RenderError(f"`mm_per_pixel = {shown(mm_per_pixel)}`; expected a length above 0.")
     edges_mm, density = profile.flat_annuli()
     squares = np.square(edges_mm / mm_per_pixel)
@@ -152,6 +154,7 @@ def render_samples(
     RenderError
         Numbers of samples, scale, frame or seed are out of range, or scene and sampler do not fit.
     """
+    check_record("sampler", sampler, KernelSampler, RenderError)
     from sssfit._jit import thread_pool
     from sssfit._jit.adaptive import frame_key, sample_rows  # numba: 0.4 s
 
@@ -206,16 +209,19 @@ def samples_for(
     Raises
     ------
     RenderError
-        The target is not above 0.
+        The target is not above 0, or the variance or the start is no array of numbers that fit.
     """
-    if not (np.isfinite(target_variance) and target_variance > 0.0):
-        raise RenderError(f"target_variance = {shown(target_variance)}; expected a number above 0.")
-    wanted = np.asarray(variance, dtype=np.float64) / target_variance
-    known = np.where(np.isnan(wanted), start, np.minimum(wanted, MOST_SAMPLES))
+    target_variance = positive(target_variance, "target_variance")
+    wanted = as_light(variance, "variance") / target_variance
+    first = as_light(start, "start")
+    if first.shape not in ((), wanted.shape):
+        raise RenderError(f"start has shape {first.shape}; expected a number or {wanted.shape}.")
+    known = np.where(np.isnan(wanted), first, np.minimum(wanted, MOST_SAMPLES))
     return np.clip(np.ceil(known), LEAST_SAMPLES, MOST_SAMPLES).astype(np.int32)
 
 
 def _checked_counts(counts: npt.ArrayLike, shape: tuple[int, int]) -> CountArray:
+    as_light(counts, "counts")  # raises for what is no array of numbers
     given = np.asarray(counts)
     if given.dtype.kind not in "iu" or given.shape not in ((), shape):
         raise RenderError(
@@ -231,7 +237,8 @@ def _checked_counts(counts: npt.ArrayLike, shape: tuple[int, int]) -> CountArray
 
 
 def _checked_scale(scale: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
-    given = np.asarray(scale, dtype=np.float32)
+    with np.errstate(over="ignore"):  # checked below
+        given = as_light(scale, "scale").astype(np.float32)
     if given.shape not in ((), shape):
         raise RenderError(f"a scale of shape {given.shape}; expected {shape}, or one number.")
     if not (np.isfinite(given).all() and (given > 0.0).all()):

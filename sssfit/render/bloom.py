@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import is_number
 from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light
 from sssfit.messages import shown
 
 # Standard deviations over the picture's height, and their shares: a narrow core and a wide veil, as
@@ -29,13 +31,17 @@ def bloomed(picture: npt.NDArray[np.floating[Any]], share: float) -> npt.NDArray
     Raises
     ------
     RenderError
-        The share is not from 0 to 1.
+        The share is not from 0 to 1, or the picture is none.
     """
     from scipy.ndimage import gaussian_filter
 
-    if not 0.0 <= share <= 1.0:
+    if not is_number(share) or not 0.0 <= share <= 1.0:
         raise RenderError(f"bloom = {shown(share)}; expected a share of the light from 0 to 1.")
-    light = np.asarray(picture, dtype=np.float64)
+    light = as_light(picture, "the picture")
+    if light.ndim != 3:
+        raise RenderError(
+            f"the picture has shape {light.shape}; expected rows, columns and channels."
+        )
     spread = np.zeros_like(light)
     for width, part in zip(_WIDTHS, _SHARES, strict=True):
         sigma = width * light.shape[0]

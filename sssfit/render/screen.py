@@ -24,8 +24,9 @@ import numpy.typing as npt
 
 from sssfit._jit import screen as compiled
 from sssfit._jit import thread_pool
-from sssfit.arrays import FloatArray, read_only
+from sssfit.arrays import FloatArray, check_record, read_only
 from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light
 from sssfit.kernel import SeparableKernel
 from sssfit.messages import counted, shown
 from sssfit.process import thread_count
@@ -139,10 +140,10 @@ def depth_variances(
     kernel's second moment per axis, which is the same for a single Gaussian.
     """
     if given_mm2 is not None:
-        values = np.asarray(given_mm2, dtype=np.float64)
+        values = as_light(given_mm2, "depth_variance_mm2")
         if values.shape not in ((), (len(kernel.channels),)) or not (values > 0.0).all():
             raise RenderError(
-                f"depth_variance_mm2 = {given_mm2}; expected a variance above 0, one or "
+                f"depth_variance_mm2 = {shown(given_mm2)}; expected a variance above 0, one or "
                 f"{len(kernel.channels)}."
             )
         return np.broadcast_to(values, (len(kernel.channels),))
@@ -174,7 +175,7 @@ def _sizes(scale: npt.ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
     """Return the map of kernel sizes (H, W)."""
     if scale is None:
         return np.ones(shape)
-    sizes = np.asarray(scale, dtype=np.float64)
+    sizes = as_light(scale, "scale")
     if sizes.shape not in ((), shape):
         raise RenderError(f"scale has shape {sizes.shape}; expected a number or {shape}.")
     if not (np.isfinite(sizes) & (sizes >= 0.0)).all():
@@ -261,6 +262,8 @@ def render_screen(
     RenderError
         The scene has no depth or other channels than the kernel, or a setting is invalid.
     """
+    check_record("scene", scene, Scene, RenderError)
+    check_record("kernel", kernel, SeparableKernel, RenderError)
     channels = len(kernel.channels)
     scene = scene.for_channels(kernel.channels)
     check_buffers(scene, channels)

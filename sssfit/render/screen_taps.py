@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from sssfit._jit import screen_taps as compiled
 from sssfit._jit import thread_pool
-from sssfit.arrays import read_only
+from sssfit.arrays import check_record, read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel
 from sssfit.kernel.taps import Stage, Taps
@@ -93,6 +93,8 @@ def render_screen_taps(
         The scene has no depth or other channels than the table, a setting is invalid, or the light
         exceeds what the intermediate format holds.
     """
+    check_record("scene", scene, Scene, RenderError)
+    check_record("taps", taps, Taps, RenderError)
     channels = len(taps.channels)
     check_no_disk(taps)
     scene = scene.for_channels(taps.channels)

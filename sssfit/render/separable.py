@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import read_only
+from sssfit.arrays import check_record, read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.process import thread_count
@@ -60,6 +60,7 @@ def render_separable(
     RenderError
         Kernel and scene differ in pixel size or channels, or a setting is invalid.
     """
+    check_record("kernel", kernel, SeparableKernel, RenderError)
     scene = scene_for(scene, kernel.channels)
     check_pitch(scene, kernel)
     precision = precision_for(dtype, scene)

@@ -18,7 +18,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import check_record
 from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.messages import shown
 from sssfit.render.borders import check_memory, check_sums, precision_for, scene_for, source_indices
@@ -89,6 +91,7 @@ def render_taps(
         Channels or coverage do not fit the picture, a setting is invalid, or the light exceeds what
         the intermediate format holds.
     """
+    check_record("taps", taps, Taps, RenderError)
     channels = len(taps.channels)
     scene = scene_for(scene, taps.channels)
     precision = precision_for(dtype, scene)
@@ -156,6 +159,7 @@ def four_texels(pixels: FloatArray, border: str) -> FloatArray:
 
 def reach_pixels(taps: Taps, mm_per_pixel: float | None = None) -> int:
     """Return how far light moves along an axis [pixels], with all changes of size."""
+    check_record("taps", taps, Taps, RenderError)
     pitch_mm = mm_per_pixel or taps.mm_per_pixel
     each = [
         float(stage.offsets_mm.max()) / pitch_mm + 3.0 * 2.0**stage.level for stage in taps.stages
@@ -186,7 +190,7 @@ def _checked(
 ) -> FloatArray | None:
     if coverage is None:
         return None
-    covered = np.asarray(coverage, dtype=precision)
+    covered = as_light(coverage, "coverage").astype(precision, copy=False)
     if covered.shape != size or not ((covered >= 0.0) & (covered <= 1.0)).all():
         raise RenderError(
             f"coverage of shape {covered.shape}; expected {size}, with numbers from 0 to 1."

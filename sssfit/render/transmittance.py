@@ -26,8 +26,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, check_record
 from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light, positive
 from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.messages import counted
 from sssfit.render.taps import response
@@ -67,8 +68,8 @@ def transmittance(
         Shapes do not fit, a variance is not above 0, or a thickness is below 0 or NaN.
     """
     s = _thickness(thickness_mm)
-    variances = np.asarray(variances_mm2, dtype=np.float64)
-    shares = np.asarray(weights, dtype=np.float64)
+    variances = as_light(variances_mm2, "variances_mm2")
+    shares = as_light(weights, "weights")
     if variances.ndim != 2 or variances.shape != shares.shape:
         raise RenderError(
             f"variances of shape {variances.shape} and weights of shape {shares.shape}; expected "
@@ -76,8 +77,7 @@ def transmittance(
         )
     if not ((variances > 0.0) & np.isfinite(variances) & np.isfinite(shares)).all():
         raise RenderError("variances must be above 0, and weights must be finite numbers.")
-    if not (np.isfinite(widths) and widths > 0.0):
-        raise RenderError(f"widths = {widths:g}; expected a number above 0, such as 2.")
+    widths = positive(widths, "widths")
     total = np.zeros((*s.shape, shares.shape[1]))
     for variance, share in zip(variances, shares, strict=True):
         total += share * np.exp(-np.square(s)[..., None] / (widths * variance))
@@ -86,7 +86,7 @@ def transmittance(
 
 def _thickness(thickness_mm: npt.ArrayLike) -> FloatArray:
     """Return thicknesses as float64, or raise an error."""
-    s = np.asarray(thickness_mm, dtype=np.float64)
+    s = as_light(thickness_mm, "thickness_mm")
     if not (s >= 0.0).all():
         raise RenderError("thickness_mm has values that are negative or NaN; expected 0 and up.")
     return s
@@ -119,6 +119,7 @@ def beyond(kernel: Kernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     RenderError
         A thickness is below 0 or NaN.
     """
+    check_record("kernel", kernel, Kernel, RenderError)
     s = _thickness(thickness_mm)[..., None]
     line = _half_line(kernel)
     edges_mm = kernel.mm_per_pixel * (np.arange(len(line)) + 0.5)
@@ -145,6 +146,7 @@ def _half_line(kernel: Kernel) -> FloatArray:
 
 def through(kernel: Kernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     """Return T(s) of a kernel (..., C): from its Gaussians if it has any, else from `beyond`."""
+    check_record("kernel", kernel, Kernel, RenderError)
     if isinstance(kernel, Taps):
         return beyond(kernel, thickness_mm)
     if any(_gaussians(kernel.parameters.get(name))[0] for name in kernel.channels):
@@ -163,6 +165,7 @@ def gaussians_of(kernel: SeparableKernel) -> tuple[FloatArray, FloatArray]:
     RenderError
         The kernel was not made of Gaussians, or a channel's weights have no positive sum.
     """
+    check_record("kernel", kernel, SeparableKernel, RenderError)
     found = [_gaussians(kernel.parameters.get(name)) for name in kernel.channels]
     terms = max((len(each[0]) for each in found), default=0)
     if terms == 0:
@@ -206,6 +209,8 @@ def transmitted(scene: Scene, kernel: Kernel) -> FloatArray | None:
         One of the two buffers is missing, the light behind has other channels than one or the
         kernel's, or a channel's Gaussians have no positive sum.
     """
+    check_record("scene", scene, Scene, RenderError)
+    check_record("kernel", kernel, Kernel, RenderError)
     if scene.thickness_mm is None and scene.back_irradiance is None:
         return None
     if scene.thickness_mm is None or scene.back_irradiance is None:

@@ -49,9 +49,9 @@ def preset(name: str) -> Preset:
     ArgumentError
         There is none; the message names the nearest.
     """
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise ArgumentError(
-            f"no preset {shown(name)}; {did_you_mean(name, list(PRESETS))}expected one of "
+            f"no preset {shown(name)}; {did_you_mean(str(name), list(PRESETS))}expected one of "
             f"{', '.join(PRESETS)}."
         )
     found: Preset = imported(PRESETS[name].function)  # type: ignore[assignment]
