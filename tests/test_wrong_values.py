@@ -231,6 +231,16 @@ def test_light_near_the_largest_number_is_summed_or_refused():
         sssfit.render(near, KERNEL, dtype=np.float32)
 
 
+@pytest.mark.parametrize("border", ["mirror", "zero"])
+def test_sums_of_the_true_picture_are_finite_or_refused(border):
+    """Its transforms add up all pixels."""
+    bright = dataclasses.replace(SCENE, irradiance=np.full((4, 4, 1), 1e308))
+    with pytest.raises(RenderError, match=r"are above .* of float64; scale it down"):
+        render_reference(bright, PROFILE, border=border)
+    bright = dataclasses.replace(SCENE, irradiance=np.full((4, 4, 1), 1e300))
+    assert np.isfinite(render_reference(bright, PROFILE, border=border)).all()
+
+
 @pytest.mark.parametrize("seed", [1.5, -1, "1", True])
 def test_seeds_of_fits(seed):
     with pytest.raises(FitError, match="seed = "):

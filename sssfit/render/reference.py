@@ -8,6 +8,7 @@ stays near that of one forward and one inverse transform of the continued pictur
 """
 
 import dataclasses
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,13 @@ from sssfit.messages import shown
 from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.profile.pixels import checked_support
-from sssfit.render.borders import check_channels, check_memory, scene_for, source_indices
+from sssfit.render.borders import (
+    check_channels,
+    check_memory,
+    check_sums,
+    scene_for,
+    source_indices,
+)
 from sssfit.scene.record import Scene
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -54,7 +61,8 @@ def render_reference(
     Raises
     ------
     RenderError
-        The channels do not match, the border is unknown, or the memory limit is exceeded.
+        The channels do not match, the border is unknown, the memory limit is exceeded, or sums of
+        the light are above the largest number.
     """
     if not isinstance(profile, Profile):
         raise RenderError(f"profile = {shown(profile)}; expected a Profile.")
@@ -63,8 +71,11 @@ def render_reference(
     half = reference_half_pixels(profile, scene.mm_per_pixel, scene.height, scene.width)
     _plan(scene.height, scene.width, half, profile.n_channels, border)
     quadrant, left_out = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
-    picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
-    picture += left_out * far_irradiance(scene.irradiance, border)
+    with np.errstate(over="ignore", invalid="ignore"):  # checked below
+        picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
+        picture += left_out * far_irradiance(scene.irradiance, border)
+    # The transforms add up all pixels, with a margin on both sides.
+    check_sums(picture, scene, math.prod(padded_shape(scene.height, scene.width, half, border)))
     # Rounding of the transforms, 1e-16 of the largest pixel, would give negative light.
     return np.maximum(picture, 0.0, out=picture) if quadrant.min() >= 0.0 else picture
 
