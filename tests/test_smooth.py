@@ -97,8 +97,15 @@ def test_a_power_law_is_not_penalised():
 
 
 def test_a_profile_without_errors_is_refused_in_one_line(exact):
-    for profile in (exact, of_photons(walk(exact, 1000, 1), None)):
-        with pytest.raises(ProfileError, match="no standard errors") as caught:
+    walked = walk(exact, 1000, 1)
+    nothing = np.full_like(walked.annulus_energy, np.nan)
+    unknown = dataclasses.replace(walked, annulus_energy_stderr=nothing)
+    for profile, said in (
+        (exact, "is of no photons"),  # its errors are estimates of the solver's
+        (of_photons(walked, None), "is of no photons"),
+        (unknown, "has no standard errors"),
+    ):
+        with pytest.raises(ProfileError, match=f"the profile {said}, and only a walk's") as caught:
             smoothed(profile)
         assert "\n" not in str(caught.value)
 

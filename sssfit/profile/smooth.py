@@ -64,9 +64,10 @@ def smoothed(profile: Profile) -> Profile:
             "annuli, and their noise is not Poisson's; smooth the pencil beam's profile."
         )
     if profile.photons is None or not np.isfinite(stderr).all():
+        lacks = "is of no photons" if profile.photons is None else "has no standard errors"
         raise ProfileError(
-            f"{profile.label}: the profile has no standard errors, and only a walk's noise can be "
-            "smoothed; expected a profile of photons."
+            f"{profile.label}: the profile {lacks}, and only a walk's noise can be smoothed; "
+            "expected one of photons with standard errors."
         )
     with one_blas_thread():
         channels = [
