@@ -320,3 +320,24 @@ def test_frames_of_another_size_are_refused_in_one_line():
         batch_covariance([1.0], [2.0])
     with pytest.raises(ArgumentError, match="expected the same two or more"):
         batch_covariance([1.0, 2.0], [2.0, 3.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: MovingMean(0.1).update("x"), "a frame is not an array of numbers"),
+        (lambda: MovingMean(0.1).update([[1.0], [2.0, 3.0]]), "a frame is not an array of numbers"),
+        (lambda: MovingVariance(0.1).update(None), "a frame is not an array of numbers"),
+        (
+            lambda: MovingCovariance(0.1).update(np.ones((4, 4)), np.ones(3)),
+            r"frames of the shapes \(4, 4\), \(3,\); expected the same of each",
+        ),
+        (lambda: MovingCovariance(0.1).update(), "frames of the shapes none"),
+        (lambda: batch_covariance("x", "x"), "x is not an array of numbers"),
+        (lambda: batch_covariance(1.0, 2.0), "expected the same two or more"),
+    ],
+)
+def test_what_is_no_frame_is_refused_in_one_line(call, said):
+    with pytest.raises(ArgumentError, match=said) as caught:
+        call()
+    assert "\n" not in str(caught.value)

@@ -16,7 +16,7 @@ pixel without history has the mean NaN.
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, number_array
 from sssfit.errors import ArgumentError
 from sssfit.messages import shown
 from sssfit.motion.reproject import Shift, reprojected
@@ -186,8 +186,8 @@ def batch_covariance(x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
     ArgumentError
         There is one sample or none, or the shapes differ.
     """
-    first, second = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if first.shape != second.shape or len(first) < 2:
+    first, second = number_array("x", x, ArgumentError), number_array("y", y, ArgumentError)
+    if first.shape != second.shape or not first.ndim or len(first) < 2:
         raise ArgumentError(
             f"samples of shapes {first.shape} and {second.shape}; expected the same two or more."
         )
@@ -199,7 +199,11 @@ def batch_covariance(x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
 
 def known(*variables: npt.ArrayLike) -> FloatArray:
     """Stack variables (K, ...); all are NaN where one is NaN or infinite."""
-    stacked = np.stack([np.asarray(each, dtype=np.float64) for each in variables])
+    frames = [number_array("a frame", each, ArgumentError) for each in variables]
+    if len({each.shape for each in frames}) != 1:
+        shapes = ", ".join(str(each.shape) for each in frames)
+        raise ArgumentError(f"frames of the shapes {shapes or 'none'}; expected the same of each.")
+    stacked = np.stack(frames)
     return np.where(np.isfinite(stacked).all(axis=0), stacked, np.nan)
 
 
