@@ -21,7 +21,7 @@ from sssfit.compare.taps_view import view_taps
 from sssfit.errors import FitError, ProfileError, RenderError, SssfitError
 from sssfit.export.lut import lut_bytes
 from sssfit.export.presets import preset
-from sssfit.fit import fit_preintegrated
+from sssfit.fit import fit_guided, fit_preintegrated, fit_svd
 from sssfit.fit.artist import fit_artist
 from sssfit.fit.cascade import fit_cascade
 from sssfit.fit.disk import fit_disk
@@ -52,7 +52,7 @@ from sssfit.render.taps import render_taps
 from sssfit.render.transmittance import beyond, through, transmittance
 from sssfit.scene.made import make_scene
 from sssfit.scene.mesh import Mesh
-from sssfit.simulate import read_checkpoint
+from sssfit.simulate import read_checkpoint, simulate_burley, simulate_montecarlo
 from sssfit.sweep import load_plan, sweep_to_store
 
 WRONG = [
@@ -125,6 +125,24 @@ CALLS = {
         | {"normalize": False, "smooth": False, "place": None},
     ),
     "fit svd": (sssfit.fit, {"profile": PROFILE, "method": "svd", "rank": 1}),
+    "fit_svd": (fit_svd, {"profile": PROFILE, "normalize": False, "energy": "keep"}),
+    "fit_guided": (
+        fit_guided,
+        {"profile": PROFILE, "mm_per_pixel": 1.0, "k": 1.0, "b": 50.0, "centre_bound": 0.2},
+    ),
+    "settings of fit_cascade": (
+        lambda **given: fit_cascade(PROFILE, **({"stages": "1", "mm_per_pixel": 2.0} | given)),
+        {"fetches": 8.0, "passes": 2, "still": False, "full_resolution": False}
+        | {"spectrum": "white"},
+    ),
+    "simulate_burley": (
+        simulate_burley,
+        {"material": MATERIAL, "reflectance": 0.5, "mapping": "diffuse", **SIZES},
+    ),
+    "simulate_montecarlo": (
+        lambda **given: simulate_montecarlo(MATERIAL, photons=50, **(SIZES | given)),
+        {"numerical_aperture": 0.2, "target_error": None, "angles": None},
+    ),
     "simulate": (sssfit.simulate, {"material": "skin1", "method": "burley", **SIZES}),
     "simulate walk": (
         lambda **given: sssfit.simulate("skin1", "montecarlo", **(SIZES | given)),

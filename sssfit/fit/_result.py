@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, plain, true_or_false
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import Target
 from sssfit.kernel import SeparableKernel, Taps
@@ -23,7 +23,7 @@ ENERGIES = ("rescale", "keep")
 
 def rescales_energy(energy: str) -> bool:
     """Return True for "rescale" and False for "keep"; any other word raises FitError."""
-    if energy not in ENERGIES:
+    if not isinstance(energy, str) or energy not in ENERGIES:
         raise FitError(f"energy = {shown(energy)}; expected {' or '.join(map(repr, ENERGIES))}.")
     return energy == "rescale"
 
@@ -235,7 +235,7 @@ def fit_channels(
         raise FitError(f"{name}: the {method} fit is not finite; try fewer terms.")
     energy = _energy(signs, half, target.copies)
     scale = np.ones(len(fits))
-    if normalize:
+    if true_or_false("normalize", normalize, FitError):
         if (energy[~empty] <= 0.0).any():
             raise FitError(f"{name}: the {method} kernel has no energy that could be made 1.")
         scale = np.where(empty, 1.0, energy)

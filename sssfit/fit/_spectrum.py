@@ -256,7 +256,8 @@ def _power(
     channels: list[int], pictures: Pictures, w: FloatArray, cell: FloatArray, wanted: FloatArray
 ) -> FloatArray:
     """Return the weights (C, n, n) of squared errors, of which sum power wanted^2 = 1."""
-    if not isinstance(pictures, Scene) and pictures not in SPECTRA:
+    is_word = isinstance(pictures, str) and pictures in SPECTRA
+    if not is_word and not isinstance(pictures, Scene):
         raise FitError(f"spectrum = {shown(pictures)}; expected {' or '.join(map(repr, SPECTRA))}.")
     power = cell[:, None] * cell
     if pictures != "white":

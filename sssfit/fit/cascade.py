@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy import optimize
 
-from sssfit.arrays import FloatArray, is_whole
+from sssfit.arrays import FloatArray, is_number, is_whole, true_or_false
 from sssfit.errors import FitError, KernelError
 from sssfit.fit._chain import Chain, Numbers, Searched
 from sssfit.fit._chain_pairs import PairChain
@@ -121,6 +121,8 @@ def fit_cascade(
     """
     begun = time.perf_counter()
     check_seed(seed)
+    still = true_or_false("still", still, FitError)
+    full_resolution = true_or_false("full_resolution", full_resolution, FitError)
     width = width_pixels(profile, pitch_of(profile, mm_per_pixel))
     shapes = structure_for(fetches, stages, passes, width, full_resolution=full_resolution)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
@@ -231,11 +233,13 @@ def structure_for(
         The budget is too small, the structure is invalid or goes beyond the budget.
     """
     budget = FETCHES if fetches is None and stages is None else fetches
-    if budget is not None and not budget >= FEWEST:
+    if budget is not None and not (is_number(budget) and budget >= FEWEST):
         raise FitError(
             f"fetches = {shown(budget)}; expected a number from {FEWEST} up: a stage of one pair "
             "takes 6, and one more to add the irradiance."
         )
+    if not isinstance(passes, Real | None):
+        raise FitError(f"passes = {shown(passes)}; expected a whole number from 1 up.")
     most = np.inf if budget is None else budget + 1e-9
     if stages is not None:
         shapes = _parsed(stages)

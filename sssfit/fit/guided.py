@@ -18,11 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_number
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.messages import shown
 from sssfit.optics import gauss_legendre
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
@@ -295,16 +296,23 @@ def _normalised_pass(a: FloatArray, most: float) -> FloatArray:
 
 
 def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
-    if not 0.0 <= k <= 4.0:
-        raise FitError(f"k = {k:g} is outside [0, 4]; 0 favours near scattering, 4 far scattering.")
-    if not _MIN_B <= b <= _MAX_B:
+    if not is_number(k) or not 0.0 <= k <= 4.0:
         raise FitError(
-            f"b = {b:g}; expected a number above 0, from {_MIN_B:g} to {_MAX_B:g}, such as 50."
+            f"k = {_said(k)} is outside [0, 4]; 0 favours near scattering, 4 far scattering."
         )
-    if centre_bound is not None and not _MIN_BOUND <= centre_bound <= 1.0:
+    if not is_number(b) or not _MIN_B <= b <= _MAX_B:
         raise FitError(
-            f"centre_bound = {centre_bound:g}; expected a share from {_MIN_BOUND:g} to 1."
+            f"b = {_said(b)}; expected a number above 0, from {_MIN_B:g} to {_MAX_B:g}, such as 50."
         )
+    is_share = is_number(centre_bound) and _MIN_BOUND <= centre_bound <= 1.0
+    if centre_bound is not None and not is_share:
+        raise FitError(
+            f"centre_bound = {_said(centre_bound)}; expected a share from {_MIN_BOUND:g} to 1."
+        )
+
+
+def _said(value: object) -> str:
+    return f"{value:g}" if is_number(value) else shown(value)
 
 
 def guided_target(profile: Profile, mm_per_pixel: Pitch | None, support_mm: float | None) -> Target:

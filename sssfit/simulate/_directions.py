@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_number, is_whole
 from sssfit.errors import SimulationError
 from sssfit.material import Material
-from sssfit.messages import note
+from sssfit.messages import note, shown
 from sssfit.profile.npz import FORMAT, FORMAT_OF_DIRECTIONS
 
 MAX_ANGLES = 180  # single precision resolves the cosines between half degrees to .2 %
@@ -42,17 +42,18 @@ class Directions:
     aperture: float | None = None
 
     def __post_init__(self) -> None:
-        if self.angles is not None and not 1 <= self.angles <= MAX_ANGLES:
+        angles, aperture = self.angles, self.aperture
+        if angles is not None and not (is_whole(angles) and 1 <= angles <= MAX_ANGLES):
             raise SimulationError(
-                f"angles = {self.angles}; give a whole number of bins from 1 to {MAX_ANGLES}."
+                f"angles = {shown(angles)}; give a whole number of bins from 1 to {MAX_ANGLES}."
             )
-        if self.aperture is not None and not 0.0 < self.aperture < math.inf:
+        if aperture is not None and not (is_number(aperture) and 0.0 < aperture < math.inf):
             raise SimulationError(
-                f"numerical_aperture = {self.aperture}; give a number above 0, such as 0.22."
+                f"numerical_aperture = {shown(aperture)}; give a number above 0, such as 0.22."
             )
-        if self.aperture is not None:  # as a profile's file records it
-            object.__setattr__(self, "aperture", float(self.aperture))
-        if self.angles is not None and self.aperture is not None:
+        if aperture is not None:  # as a profile's file records it
+            object.__setattr__(self, "aperture", float(aperture))
+        if angles is not None and aperture is not None:
             raise SimulationError(
                 "`angles` and `numerical_aperture` are both given; the angles up to that of the "
                 "aperture already hold what it sees: leave one out."

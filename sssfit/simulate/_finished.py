@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, is_number, plain
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
@@ -140,10 +140,11 @@ def end_condition(photons: int | None, target_error: float | None) -> EndConditi
     photons = whole_number("photons", photons)
     if not 2 <= photons <= MAX_PHOTONS:
         raise SimulationError(f"photons = {photons}; give a whole number from 2 to 1e12.")
-    if target_error is not None and not MIN_TARGET <= target_error < 1.0:
+    is_valid = is_number(target_error) and MIN_TARGET <= target_error < 1.0
+    if target_error is not None and not is_valid:
         raise SimulationError(
-            f"target_error = {target_error}; give a share from {MIN_TARGET:g}, which takes 1e12 "
-            "photons or more, to 1."
+            f"target_error = {shown(target_error)}; give a share from {MIN_TARGET:g}, which takes "
+            "1e12 photons or more, to 1."
         )
     return EndCondition(photons, target_error)
 

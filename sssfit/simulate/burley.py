@@ -86,7 +86,7 @@ def simulate_burley(
     [0.44, 0.22, 0.13]
     """
     layer = half_space(material, "burley")
-    if mapping not in MAPPINGS:
+    if not isinstance(mapping, str) or mapping not in MAPPINGS:
         raise SimulationError(f"mapping = {shown(mapping)}; expected one of {', '.join(MAPPINGS)}.")
     total = _reflectance(material, layer, reflectance)
     s_per_mm = MAPPINGS[mapping](total) * _scale_per_mm(material, layer, mapping)
@@ -108,7 +108,7 @@ def _reflectance(material: Material, layer: Layer, given: npt.ArrayLike | None) 
         return _own_reflectance(material, layer)
     try:
         total = np.broadcast_to(np.asarray(given, dtype=np.float64), (material.n_channels,))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):  # an integer of 400 digits
         total = np.full(1, np.nan)
     if not ((total >= 0.0) & (total <= 1.0)).all():
         raise SimulationError(
