@@ -10,6 +10,9 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+# Loaded here, they keep the real material_names, which tests below replace in its package.
+import sssfit.export.summary
+import sssfit.simulate.runner  # noqa: F401
 from sssfit.cli import main
 from sssfit.compare import pareto
 from sssfit.compare.candidates import candidates, every_candidate
